@@ -341,16 +341,9 @@ class Slider:
 
         value = float(f"{self.value:.6g}")
         box = dcc.Input(value, "number", id=f"{name}-typed", step="any", debounce=True)
-        slider = dcc.Slider(
-            self.low,
-            self.high,
-            self.step,
-            value=value,
-            id=name,
-            marks={float(f"{at:.4g}"): f"{at:.3g}" for at in np.linspace(self.low, self.high, 5)},
-            updatemode="drag",
-            allow_direct_input=False,
-        )
+        marks = {float(f"{at:.4g}"): f"{at:.3g}" for at in np.linspace(self.low, self.high, 5)}
+        scale = self.low, self.high, self.step
+        slider = dcc.Slider(*scale, marks=marks, value=value, id=name, updatemode="drag", allow_direct_input=False)
         label = html.Label(self.label, htmlFor=f"{name}-typed")
         return html.Div([label, box, slider], style={"marginBottom": "0.5rem"})
 

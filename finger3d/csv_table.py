@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.io import text_of
+from finger3d.io import file_bytes, text_of
 
 _SEPARATORS = ",;\t"
 _ONE_COLUMN = "\x1f"
@@ -52,9 +52,8 @@ class CsvTable:
         Finger3dError
             For a row with another number of cells than columns.
         """
-        reader = csv.reader(
-            ("" if _is_comment(line) else line for line in lines), delimiter=self.separator, strict=True
-        )
+        uncommented = ("" if _is_comment(line) else line for line in lines)
+        reader = csv.reader(uncommented, delimiter=self.separator, strict=True)
         rows, count = {}, len(self.names)
         try:
             for cells in reader:
@@ -138,13 +137,7 @@ def read_table(path: Path, is_name: Callable[[str], bool]) -> CsvTable:
     Finger3dError
         If the file cannot be read, is no text, a name occurs twice, or a row has another number of cells.
     """
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise Finger3dError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
-    lines = io.StringIO(decoded(str(path), content), newline=None).readlines()
+    lines = io.StringIO(decoded(str(path), file_bytes(path)), newline=None).readlines()
     table, used = with_names(str(path), lines, is_name)
     return table.with_rows(lines[used:], used + 1) if table.names else table
 

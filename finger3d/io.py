@@ -35,6 +35,22 @@ def cannot_write(path: Path, error: OSError) -> Finger3dError:
     return Finger3dError(f"cannot write {path}: {reason}; choose another place with --out")
 
 
+def file_bytes(path: str | Path, hint: str = "") -> bytes:
+    """Return what a file holds.
+
+    Raises
+    ------
+    Finger3dError
+        If there is no such file, of which `hint` then says more, or it cannot be read.
+    """
+    try:
+        return Path(path).read_bytes()
+    except FileNotFoundError:
+        raise Finger3dError(f"{path}: there is no such file{hint}") from None
+    except OSError as error:
+        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
+
+
 @contextmanager
 def atomic(path: str | Path) -> Iterator[Path]:
     """Give the name of a temporary file beside `path`; it takes the place of `path` when the block ends well.

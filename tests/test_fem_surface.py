@@ -125,8 +125,7 @@ def touched(
     mesh: Mesh, face: BoundarySurface, u: np.ndarray, gap: np.ndarray, normal: np.ndarray, share: float | None
 ) -> DeformedContact:
     object_share = None if share is None else np.full(len(face.nodes), share)
-    given = {"points": mesh.points, "displacement": u, "gap": gap, "normal": normal}
-    return deformed_contact(face, **given, axes=(), object_share=object_share)
+    return deformed_contact(face, mesh.points, u, (gap, normal), (), object_share)
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -205,9 +204,7 @@ def test_nodal_forces_add_up_to_those_of_the_points_on_a_ball_smaller_than_a_hat
 def test_a_point_on_a_symmetry_plane_between_two_walls_has_the_normal_of_an_upright_object(d: int) -> None:
     mesh, face, u = made(d)
     away = -np.sign(face.samples[:, :1]) * np.eye(d)[0]  # walls at x = -2 and 2
-    at = deformed_contact(
-        face, points=mesh.points, displacement=u, gap=2.0 + (face.samples * away).sum(axis=1), normal=away, axes=("x",)
-    )
+    at = deformed_contact(face, mesh.points, u, (2.0 + (face.samples * away).sum(axis=1), away), ("x",))
     on_plane = face.points[:, 0] == 0.0
     assert on_plane.any()
     assert at.bases[on_plane, 0] == pytest.approx(np.tile(-np.eye(d)[1], (on_plane.sum(), 1)))

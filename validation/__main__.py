@@ -10,7 +10,8 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from finger3d import cli
-from finger3d.cli.common import check_folder, job
+from finger3d.cli.common import job
+from finger3d.cli.folders import check_folder
 from finger3d.cli.options import Json
 from finger3d.cli.printing import print_columns, print_json
 from finger3d.errors import MissingError

@@ -220,8 +220,7 @@ def _with_borders(model: Model, axes: tuple[str, ...], cells: int, size: PressSi
     edges = 2.0 * CONTACT_EXTENT * (x_max - x_min + z_max - z_min) / 2 ** len(axes) / mesh.size_mm
     finer = mesh.stick_refinement
     points = BORDER_POINTS[mesh.mesher == "swept"] * (0.3 * finer**2 + finer - 1.0) * edges
-    dofs = size.dofs + BORDER_UNKNOWNS * points
-    return round(cells * dofs / size.dofs), PressSize(size.dim, dofs, size.contact_points + points)
+    return _with_points(cells, size, points, BORDER_UNKNOWNS)
 
 
 def _with_gauges(model: Model, axes: tuple[str, ...], cells: int, size: PressSize) -> tuple[int, PressSize]:
@@ -239,7 +238,12 @@ def _with_gauges(model: Model, axes: tuple[str, ...], cells: int, size: PressSiz
         mirrored = sum(abs(at) < reach for axis, at in (("x", x), ("z", z)) if axis in axes)
         face = min(math.pi * reach, 2.0 * model.design.width_mm) * reach / 2.0**mirrored
         points += max(face / 0.866 * (edge**-2 - mesh.size_mm**-2), 0.0)
-    dofs = size.dofs + GAUGE_UNKNOWNS * points
+    return _with_points(cells, size, points, GAUGE_UNKNOWNS)
+
+
+def _with_points(cells: int, size: PressSize, points: float, unknowns: float) -> tuple[int, PressSize]:
+    """Return cells and size of a mesh with more contact points, each with so many unknowns in and below the face."""
+    dofs = size.dofs + unknowns * points
     return round(cells * dofs / size.dofs), PressSize(size.dim, dofs, size.contact_points + points)
 
 

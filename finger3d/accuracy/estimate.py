@@ -327,10 +327,9 @@ def discretisation(
     told = [(one.ratio, numbers(one.problem, one.steps[-1])) for one in pressed]
     ratio, beside, _ = pressed[0]
     kind = "coarse" if ratio > 1.0 else "finer"
+    end = steps[-1]
     found = ErrorEstimate(
-        discretisation=spread_error(
-            numbers(own, steps[-1]), told, in_space(steps[-1].readings), spacing(own, steps[-1])
-        ),
+        discretisation=spread_error(numbers(own, end), told, in_space(end.readings), spacing(own, end)),
         method=_on_meshes([one.problem for one in pressed], kind),
         companion_numbers=told[0][1],
         ratio=ratio,

@@ -67,10 +67,8 @@ def advise(model: Model, strain: float, large: ChangeEstimate | None = None) -> 
         if large and (said := _changes(large.significant, {c.key for c in of_kind(model.columns, "gauge")})):
             out.append(f"large deformation would change {said}: switch on [effects.large_deformation]")
         elif strain >= _LARGE_STRAIN:
-            out.append(
-                f"principal strains reach {strain:.2g}, large for linear elasticity: switch on "
-                "[effects.large_deformation]"
-            )
+            what = f"principal strains reach {strain:.2g}, large for linear elasticity"
+            out.append(f"{what}: switch on [effects.large_deformation]")
     return out + _width(model)
 
 
@@ -271,10 +269,8 @@ class Judgement:
         if strain is None:
             return Judged(True, ChangeEstimate(method="no coarse press resolves the contact"), "no coarse press tells")
         press = next(iter(self._known.values()))
-        changes = {
-            name: Change(press.numbers[name], 0.0, _BY_STRAIN * strain * scale, scale)
-            for name, scale in press.scales.items()
-        }
+        share = _BY_STRAIN * strain
+        changes = {name: Change(press.numbers[name], 0.0, share * s, s) for name, s in press.scales.items()}
         estimate = ChangeEstimate(changes=changes, method=f"principal strains of {strain:.2g} without it")
         return Judged(strain >= STRAIN_TOLERANCE, estimate, f"principal strains reach {strain:.2g}")
 
@@ -316,10 +312,8 @@ class Judgement:
                 }
         changes = {key: Change(before.numbers[key], d, error[key], scales[key]) for key, d in change.items()}
         edges = (coarser(self.model, factor) if factor > 1.0 else self.model).mesh
-        method = (
-            f"presses with and without it, with {edges.size_mm:.4g} and {edges.base_size_mm:.4g} mm in at most "
-            f"{_STEPS[0]} increments a leg; error: {how}, and from how far the coarse press is from the press"
-        )
+        method = f"presses with and without it, with {edges.size_mm:.4g} and {edges.base_size_mm:.4g} mm in at most "
+        method += f"{_STEPS[0]} increments a leg; error: {how}, and from how far the coarse press is from the press"
         counting = {
             key: abs(c.relative) if key in zones else abs(c.relative) + c.error / c.scale
             for key, c in changes.items()

@@ -194,12 +194,8 @@ class Refinement:
 
     def as_dict(self) -> Tree:
         """Return the entry of summary.json."""
-        return {
-            "tolerance": self.tolerance,
-            "met": self.met,
-            "stopped": self.stopped,
-            "rounds": [asdict(r) for r in self.rounds],
-        }
+        rounds = [asdict(r) for r in self.rounds]
+        return {"tolerance": self.tolerance, "met": self.met, "stopped": self.stopped, "rounds": rounds}
 
 
 def refine_mesh(
@@ -267,12 +263,8 @@ def refine_mesh(
             break
         options = found
     refined = Refinement(tolerance, options, tuple(rounds), stopped)
-    return replace(
-        refined,
-        mesh=meshes[rounds.index(refined.best)],
-        stopped="met" if refined.met else stopped,
-        problem=problem if refined.best is rounds[-1] else None,
-    )
+    mesh, last = meshes[rounds.index(refined.best)], problem if refined.best is rounds[-1] else None
+    return replace(refined, mesh=mesh, stopped="met" if refined.met else stopped, problem=last)
 
 
 def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
@@ -294,17 +286,9 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
         factor = (_SAFETY * tolerance / error) ** (1.0 / (1.0 if kinds[worst].is_zone else kinds[worst].order))
         factor = min(max(factor, _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
         wanted = _shorter(mesh, _zones_to_refine(beside, found.companion_numbers, worst, kinds[worst]), factor)
-    done = Round(
-        size_mm=mesh.size_mm,
-        base_size_mm=mesh.base_size_mm,
-        dofs=int(problem.body.stiffness.upper.shape[0]),
-        error=error,
-        number=worst,
-        seconds=time.perf_counter() - start,
-        gauge_refinement=mesh.gauge_refinement,
-        stick_refinement=mesh.stick_refinement,
-    )
-    return problem, done, wanted
+    edges = {key: getattr(mesh, key) for key in ("size_mm", "base_size_mm", "gauge_refinement", "stick_refinement")}
+    dofs, seconds = int(problem.body.stiffness.upper.shape[0]), time.perf_counter() - start
+    return problem, Round(**edges, dofs=dofs, error=error, number=worst, seconds=seconds), wanted
 
 
 def _edges(mesh: MeshOptions) -> tuple[float, ...]:
@@ -343,22 +327,19 @@ def _shorter(mesh: MeshOptions, zones: set[str], factor: float) -> MeshOptions:
     at_contact = factor if "contact" in zones else 1.0
     size = mesh.size_mm * at_contact
     base = max(size, mesh.base_size_mm * (factor if "base" in zones else 1.0))
-    # edges at gauges and borders are given over those at the contact
-    finer = [
-        four_digits(min(max(1.0, ratio * at_contact / (min(factor, 1.0 / _FINER) if zone in zones else 1.0)), most))
-        for zone, ratio, most in (
-            ("gauges", mesh.gauge_refinement, _MOST_GAUGE_REFINEMENT),
-            ("border", mesh.stick_refinement, MOST_STICK_REFINEMENT),
-        )
-    ]
-    return replace(
-        mesh,
-        size_mm=four_digits(size),
-        base_size_mm=four_digits(base),
-        gauge_refinement=finer[0],
-        stick_refinement=finer[1],
-        borders=None,
-    )
+
+    def finer(zone: str, ratio: float, most: float) -> float:  # edges there are given over those at the contact
+        there = min(factor, 1.0 / _FINER) if zone in zones else 1.0
+        return four_digits(min(max(1.0, ratio * at_contact / there), most))
+
+    gauges = finer("gauges", mesh.gauge_refinement, _MOST_GAUGE_REFINEMENT)
+    border = finer("border", mesh.stick_refinement, MOST_STICK_REFINEMENT)
+    return replace(_of_sizes(mesh, size, base), gauge_refinement=gauges, stick_refinement=border)
+
+
+def _of_sizes(mesh: MeshOptions, size: float, base: float) -> MeshOptions:
+    """Return a mesh with other edge lengths, mm, without the borders that were found on it."""
+    return replace(mesh, size_mm=four_digits(size), base_size_mm=four_digits(base), borders=None)
 
 
 def _longer(problem: Problem, contact_half_length_mm: float) -> MeshOptions:
@@ -367,8 +348,7 @@ def _longer(problem: Problem, contact_half_length_mm: float) -> MeshOptions:
     most = 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
     width = 0.25 * design.width_mm if problem.dim == 3 else math.inf
     size = max(own.size_mm, min(2.0 * own.size_mm, contact_half_length_mm / _FEWEST_POINTS, most, width))
-    base = max(size, min(2.0 * own.base_size_mm, most))
-    return replace(own, size_mm=four_digits(size), base_size_mm=four_digits(base), borders=None)
+    return _of_sizes(own, size, max(size, min(2.0 * own.base_size_mm, most)))
 
 
 def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:
@@ -383,7 +363,6 @@ def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: flo
         return None
     # as far as the time allows, each length in proportion
     part = math.log(least) / math.log(factor)
-    size, base = (
-        b * (w / b) ** part for b, w in ((now.size_mm, wanted.size_mm), (now.base_size_mm, wanted.base_size_mm))
-    )
+    size = now.size_mm * (wanted.size_mm / now.size_mm) ** part
+    base = now.base_size_mm * (wanted.base_size_mm / now.base_size_mm) ** part
     return replace(now, size_mm=four_digits(size), base_size_mm=four_digits(max(size, base)))

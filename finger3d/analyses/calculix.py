@@ -12,6 +12,7 @@ tetrahedron.  Every element has inner nodes of its own, and hence a positive vol
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ from finger3d.fem.mesh import FREE_FACES, Mesh
 from finger3d.io import claimed, holds, write_text
 from finger3d.mechanics.discretise.build import mesh_part
 from finger3d.mechanics.discretise.symmetry import symmetry
-from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.model import Leg, Model, ways
 from finger3d.mechanics.path import AUTO_START
 from finger3d.objects import (
     Cylinder,
@@ -89,10 +90,8 @@ def _hyperelastic(law: IsochoricLaw, d1: float) -> tuple[str, ...]:
             terms = [number for share, alpha in law.terms for number in (share * law.shear, alpha)]
             return _cards(f"OGDEN, N={len(law.terms)}", [*terms, d1, *(len(law.terms) - 1) * [_NO_TERM * d1]])
         case Ogden():
-            raise Finger3dError(
-                f"--solver calculix: effects.large_deformation.terms: CalculiX has Ogden's law with up to {MOST_TERMS} "
-                f"terms, and the scene {len(law.terms)}"
-            )
+            has = f"CalculiX has Ogden's law with up to {MOST_TERMS} terms, and the scene {len(law.terms)}"
+            raise Finger3dError(f"--solver calculix: effects.large_deformation.terms: {has}")
     raise Finger3dError(f"--solver calculix: CalculiX has no equal of effects.large_deformation's {type(law).__name__}")
 
 
@@ -211,11 +210,8 @@ class Deck:
                 lines += [f"*ELEMENT, TYPE={kind}, ELSET=BODY{k}", *_cells(self.mesh.cells[own] + 1, own + 1)]
         first, count = len(self.mesh.points) + 1, len(self.mesh.cells)
         numbers = count + 1 + np.arange(len(self.object.elements))
-        return [
-            *lines,
-            f"*ELEMENT, TYPE={self.object.kind}, ELSET=OBJECT",
-            *_cells(self.object.elements + first, numbers),
-        ]
+        lines += [f"*ELEMENT, TYPE={self.object.kind}, ELSET=OBJECT"]
+        return lines + _cells(self.object.elements + first, numbers)
 
     def _materials(self) -> list[str]:
         section = [f"{self.thickness_mm:.12g}"] if self.mesh.dim == 2 else []
@@ -332,25 +328,18 @@ def object_elements(
         If more facets come near the finger than CalculiX can search.
     """
     obj = placed[0].object
-    reach = max(float(np.abs(pose.to_own(_corners(low, high))).max()) for pose in placed)
-    if dim == 3:
-        facets = _surface(obj, reach, sagitta_mm)
-    else:
-        facets = _section(obj, reach, sagitta_mm)
+    corners = np.array([*itertools.product(*zip(low, high, strict=True))])
+    reach = max(float(np.abs(pose.to_own(corners)).max()) for pose in placed)
+    facets = (_surface if dim == 3 else _section)(obj, reach, sagitta_mm)
     if not isinstance(obj, Plane):
         facets = _near(facets, placed, low, high)
     if not 0 < len(facets.faces) <= MOST_FACETS:
-        raise Finger3dError(
-            f"--solver calculix: {len(facets.faces)} facets of the object come near the finger; CalculiX takes 1 to "
-            f"{MOST_FACETS}: press deeper, or simplify the object"
-        )
+        near = f"{len(facets.faces)} facets of the object come near the finger"
+        allowed = f"CalculiX takes 1 to {MOST_FACETS}: press deeper, or simplify the object"
+        raise Finger3dError(f"--solver calculix: {near}; {allowed}")
     own, kind, elements = _backed(obj, facets)
     motion = np.array([pose.to_scene(own) for pose in placed])
     return ObjectElements(motion[0], kind, elements), motion - motion[0]
-
-
-def _corners(low: Float, high: Float) -> Float:
-    return np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _near(facets: Facets, placed: Sequence[PlacedObject], low: Float, high: Float) -> Facets:
@@ -510,10 +499,9 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Deck:
     _check(model)
     contact, axes = model.first_contact, symmetry(model)
     mesh, _ = mesh_part(model, contact.contact_box, axes, report)
-    law = _law(model)
-    laws = tuple(law_cards(material, law) for material in model.materials(mesh.part_labels))
+    laws = tuple(law_cards(material, model.hyperelastic_law) for material in model.materials(mesh.part_labels))
     touch = contact.first_contact_mm
-    stretches = [stretch for leg, start in _legs(model) for stretch in _stretches(leg, start)]
+    stretches = [stretch for leg, way in ways(model.legs) for stretch in _stretches(leg, way)]
     placed = [PlacedObject.of(model.object, touch, pose) for pose in (ObjectPose(0.0), *(end for end, _ in stretches))]
     depth = model.largest_depth_mm
     low, high = _box(mesh, axes, _MARGIN * depth)
@@ -553,41 +541,26 @@ def _check(model: Model) -> None:
         filled = dict(model.filled).get("friction", type(model.friction).__name__)
         raise Finger3dError(f"--solver calculix: CalculiX has no equal of [effects.{filled}]; take it out")
     if model.is_under_force:
-        raise Finger3dError(
-            "--solver calculix: force_N: a deck moves the object by depths and slides; give depth_mm, for instance "
-            "what `finger3d press` finds, and slides in place of force_x_N and force_z_N"
-        )
+        why = "a deck moves the object by depths and slides; give depth_mm, for instance what `finger3d press` finds"
+        raise Finger3dError(f"--solver calculix: force_N: {why}, and slides in place of force_x_N and force_z_N")
     if model.held_ends:
         raise Finger3dError("--solver calculix: ends that are held cannot be written")
-
-
-def _law(model: Model) -> IsochoricLaw | None:
     if model.finite_strain and model.domain == "plane-stress":
         raise Finger3dError(
             "--solver calculix: CalculiX has no equal of [effects.large_deformation] in plane stress; take it out, or "
             "change model.domain"
         )
-    return model.hyperelastic_law
 
 
-def _legs(model: Model) -> list[tuple[Leg, ObjectPose]]:
-    """Return the legs with the poses that they start from."""
-    found, at = [], ObjectPose(0.0)
-    for leg in model.legs:
-        found.append((leg, at))
-        at = leg.end(at)
-    return found
-
-
-def _stretches(leg: Leg, start: ObjectPose) -> list[tuple[ObjectPose, int]]:
+def _stretches(leg: Leg, way: Move) -> list[tuple[ObjectPose, int]]:
     """Return the ends and increments of the steps of a leg: one step, or one for each increment of a leg that turns.
 
     Within a step CalculiX moves every node of the object along a straight line.
     """
-    count, end = leg.steps if isinstance(leg.steps, int) else AUTO_START, leg.end(start)
-    if end.turns == start.turns:
-        return [(end, count)]
-    return [(Move(start, end).at(k / count), 1) for k in range(1, count)] + [(end, 1)]
+    count = leg.steps if isinstance(leg.steps, int) else AUTO_START
+    if way.end.turns == way.start.turns:
+        return [(way.end, count)]
+    return [(way.at(k / count), 1) for k in range(1, count)] + [(way.end, 1)]
 
 
 def _rigid(moved: np.ndarray) -> np.ndarray:

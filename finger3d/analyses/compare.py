@@ -309,16 +309,12 @@ def _across(solid: Case) -> list[str]:
 def numbers_table(cases: Sequence[Case], own_width_mm: float) -> list[list[str]]:
     """Return the numbers of the models at the scene's width with their errors: the head, then a row for each."""
     order = ("solid", "plane strain", "plane stress")
-    own = sorted(
-        (c for c in cases if c.ok and c.width_mm == own_width_mm and c.model in order),
-        key=lambda c: order.index(c.model),
-    )
+    own = [c for c in cases if c.ok and c.width_mm == own_width_mm and c.model in order]
+    own.sort(key=lambda c: order.index(c.model))
     shown = [*SHOWN, *dict.fromkeys(Quantity.of(column) for case in own for column in case.strains)]
-    rows = [
-        [one.label, *(_with_error(case, one.name) if one.name in case.numbers else "" for case in own)]
-        for one in shown
-        if any(case.numbers.get(one.name) for case in own)
-    ]
+    shown = [one for one in shown if any(case.numbers.get(one.name) for case in own)]
+    texts = [[_with_error(case, one.name) if one.name in case.numbers else "" for case in own] for one in shown]
+    rows = [[one.label, *cells] for one, cells in zip(shown, texts, strict=True)]
     return [["", *(case.model for case in own)], *rows] if rows else []
 
 
@@ -430,10 +426,9 @@ def compare(
     scene = scene_of(scene, overrides)
     tolerance = scene.tables.mesh.tolerance
     if tolerance is not None:
-        raise Finger3dError(
-            f"{scene.path or scene.title}: mesh.tolerance = {tolerance:g}: compare needs fixed edge lengths; press "
-            "determines them and writes them to the scene.toml of its results, which compare accepts"
-        )
+        advice = "press determines them and writes them to the scene.toml of its results, which compare accepts"
+        where = f"{scene.path or scene.title}: mesh.tolerance = {tolerance:g}"
+        raise Finger3dError(f"{where}: compare needs fixed edge lengths; {advice}")
     solid, _ = settled(_as_solid(scene), report)
     model = solid.model()
     other_widths = _other_widths(model, widths)
@@ -490,10 +485,8 @@ def _other_widths(model: Model, widths: Sequence[float] | None) -> list[float]:
 def _check(model: Model, widths: Sequence[float]) -> None:
     """Refuse a scene that has no plane model."""
     if model.design.section() is None:
-        raise Finger3dError(
-            f'compare: finger.geometry = "{model.design.name}" is {lacks_section(model.design)}, so there is no 2D '
-            "model of it; take an extruded design"
-        )
+        given = f'finger.geometry = "{model.design.name}" is {lacks_section(model.design)}'
+        raise Finger3dError(f"compare: {given}, so there is no 2D model of it; take an extruded design")
     if narrow := next((t.name for t in model.taxels if t.width_mm is None), None):
         raise Finger3dError(f'compare: taxel "{narrow}" has no width_mm; the solids need it')
     if any(leg.slide_z_mm for leg in model.legs):
@@ -558,20 +551,18 @@ def _write(comparison: Comparison, scene: Scene, height_mm: float, complete: boo
     names = list(dict.fromkeys(key for row in rows for key in row))
     write_csv(folder / "compare.csv", {key: [row.get(key, "") for row in rows] for key in names})
     by_width = {name: deviations(name, cases) for name in ("plane strain", "plane stress")}
-    write_json(
-        folder / "compare.json",
-        {
-            "scene": scene.as_dict(),
-            "outcome": str(comparison.outcome) if complete else _INCOMPLETE,
-            "verdict": comparison.verdict,
-            "table": comparison.table,
-            "within": WITHIN,
-            "width_within": {name: _width_entry(found, name == "plane stress") for name, found in by_width.items()},
-            "deviation_of_force": {name: [asdict(d) for d in found] for name, found in by_width.items()},
-            "cases": [case.as_dict() for case in cases],
-            "versions": versions(),
-        },
-    )
+    found = {
+        "scene": scene.as_dict(),
+        "outcome": str(comparison.outcome) if complete else _INCOMPLETE,
+        "verdict": comparison.verdict,
+        "table": comparison.table,
+        "within": WITHIN,
+        "width_within": {name: _width_entry(told, name == "plane stress") for name, told in by_width.items()},
+        "deviation_of_force": {name: [asdict(d) for d in told] for name, told in by_width.items()},
+        "cases": [case.as_dict() for case in cases],
+        "versions": versions(),
+    }
+    write_json(folder / "compare.json", found)
 
 
 def _width_entry(found: Sequence[Deviation], narrow: bool) -> dict[str, float] | None:

@@ -135,15 +135,8 @@ class Costs:
 
     def table(self) -> list[list[str]]:
         """Return the names of the columns, and a line for each row."""
-        head = [
-            "error",
-            "edges, mm",
-            "increments",
-            "unknowns",
-            "seconds",
-            "memory",
-            *(name.replace("_", " ") for name in self.names),
-        ]
+        named = (name.replace("_", " ") for name in self.names)
+        head = ["error", "edges, mm", "increments", "unknowns", "seconds", "memory", *named]
         return [head, *(_line(row, self.names) for row in self.rows)]
 
 
@@ -192,9 +185,8 @@ def cost(
 
         timed = [row for row in rows if row.dofs]
         errors = {name: [row.errors[name] for row in timed] for name in found.names}
-        draw_cost(
-            Path(png), found.title, [row.seconds for row in timed], errors, rows[0].seconds if rows[0].dofs else None
-        )
+        own_s = rows[0].seconds if rows[0].dofs else None
+        draw_cost(Path(png), found.title, [row.seconds for row in timed], errors, own_s)
     return found
 
 
@@ -236,9 +228,8 @@ def _pilot(model: Model, factor: float, meant: int) -> _Pilot:
     steps, chosen = march_automatic(problem)
     steps[-1].check("cost: a coarse press")
     seconds = time.perf_counter() - start - meshed
-    found = estimate(
-        problem, steps, numbers=press_numbers, chosen=chosen, companions=partial(companion_presses, unknowns=meant)
-    )
+    companions = partial(companion_presses, unknowns=meant)
+    found = estimate(problem, steps, numbers=press_numbers, chosen=chosen, companions=companions)
     if not found.discretisation:
         raise Finger3dError(f"cost: a coarse press has no error bars: {found.method}")
     numbers, kinds = press_numbers(problem, steps[-1]), kinds_of(steps[-1].readings)

@@ -285,9 +285,7 @@ class Search:
     def write_table(self, path: Path) -> None:
         """Write every evaluated design as a line of a CSV file."""
         known = list(self.known.values())
-        columns: dict[str, list[float] | list[str]] = {
-            key.key: [e.values[i] for e in known] for i, key in enumerate(self.problem.free)
-        }
+        columns = {key.key: [e.values[i] for e in known] for i, key in enumerate(self.problem.free)}
         write_csv(path, {**columns, "objective": [e.value for e in known], "outcome": [e.outcome for e in known]})
 
     def best(self) -> Evaluation | None:
@@ -400,16 +398,8 @@ def optimise(
         For a mistake in the arguments; a MissingError if no design within the bounds gives a number.
     """
     given, path = settled_tables(scene, overrides, report or QUIET)
-    problem = OptimisationProblem(
-        given=given,
-        free=free_keys(free),
-        path=path,
-        gauge=gauge,
-        mus=MUS if mus is None else tuple(mus),
-        noise=noise,
-        budget=budget,
-        seed=seed,
-    )
+    chosen = MUS if mus is None else tuple(mus)
+    problem = OptimisationProblem(given, free_keys(free), path, gauge, chosen, noise, budget, seed)
     return find_best(problem, out, report)
 
 
@@ -460,17 +450,12 @@ def _write_result(search: Search, folder: Path) -> OptimisationResult:
         raise MissingError(f"optimise: no design within the bounds gives a number; the first: {first.outcome}")
     search.report.stage("increments of the best")
     _write_best(search, folder, best, search.increments(best.values))
-    known = tuple(search.known.values())
-    draw_optimisation(
-        folder / "design.png",
-        [f.key for f in problem.free],
-        [e.values for e in known],
-        [e.value for e in known],
-        first.values,
-    )
+    known, keys = tuple(search.known.values()), tuple(f.key for f in problem.free)
+    places, values = [e.values for e in known], [e.value for e in known]
+    draw_optimisation(folder / "design.png", keys, places, values, first.values)
     optimise_page(folder).write(folder)
     return OptimisationResult(
-        keys=tuple(f.key for f in problem.free),
+        keys=keys,
         best=best,
         start=first,
         evaluations=tuple(search.done),

@@ -25,7 +25,7 @@ from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.contact.solve import RuleName
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.surface import BoundarySurface
+from finger3d.fem.surface import OF_POINTS, BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import read_arrays, write_arrays
 from finger3d.mechanics.discretise.contact_points import MARGIN, ContactPoints
@@ -49,7 +49,7 @@ _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
 _OF_MODEL = ("legs", "gauges", "markers", "taxels", "domain", "rule", "warnings", "filled")
 """Attributes of a model that a file stores as they are."""
 
-_OF_SURFACE = ("nodes", "face", "points", "area", "normals", "samples")
+_OF_SURFACE = (*OF_POINTS, "samples")
 _OF_POINTS = ("nodes", "face", "points", "area", "facets")
 """Arrays of a surface, and of its contact points, that a file stores under these names."""
 
@@ -82,13 +82,9 @@ class _Header(BaseModel):
 
 
 def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
-    mean, hats = face.average.tocsr(), face.hats.tocsr()
-    return {f"{name}_{key}": getattr(face, key) for key in _OF_SURFACE} | {
-        f"{name}_mean": mean.data,
-        f"{name}_mean_at": mean.indices,
-        f"{name}_mean_rows": mean.indptr,
-        f"{name}_hats": hats.data,
-    }
+    mean, arrays = face.average.tocsr(), {key: getattr(face, key) for key in _OF_SURFACE}
+    arrays |= {"mean": mean.data, "mean_at": mean.indices, "mean_rows": mean.indptr, "hats": face.hats.tocsr().data}
+    return {f"{name}_{key}": values for key, values in arrays.items()}
 
 
 def _face(name: str, arrays: TreeView) -> BoundarySurface:
@@ -122,10 +118,8 @@ def arrays_of(problem: Problem) -> dict[str, Array]:
     if problem.system.object_share is not None:
         arrays["object_share"] = problem.system.object_share
     if problem.without_inclusions:
-        arrays |= {
-            "bare_compliance": problem.without_inclusions.delassus.reshape(c * d, c * d),
-            "bare_reading_rows": problem.without_inclusions.system.reading_rows,
-        }
+        arrays["bare_compliance"] = problem.without_inclusions.delassus.reshape(c * d, c * d)
+        arrays["bare_reading_rows"] = problem.without_inclusions.system.reading_rows
     return arrays
 
 
@@ -133,16 +127,12 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
     """Return a problem without a meshed part, made from arrays."""
     d = arrays["sign"].shape[1]
     c = len(arrays["face_nodes"])
-    half_width, band = arrays["band"]
+    own, compliance = {key: arrays[key] for key in _OF_POINTS}, arrays["contact_compliance"]
+    width, band = map(float, arrays["band"])
+    points = ContactPoints(**own, basis=vertical_frame(d), half_width_mm=width, band_mm=band, compliance=compliance)
     system = ContactSystem(
         surface=_face("face", arrays),
-        points=ContactPoints(
-            **{key: arrays[key] for key in _OF_POINTS},
-            basis=vertical_frame(d),
-            half_width_mm=float(half_width),
-            band_mm=float(band),
-            compliance=arrays["contact_compliance"],
-        ),
+        points=points,
         delassus=arrays["compliance"].reshape(c, d, c, d),
         reading_rows=arrays["reading_rows"].reshape(len(model.columns), c * d),
         active_dofs=np.zeros(0, dtype=np.int64),
@@ -153,11 +143,8 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
     problem = Problem(model=model, condensed_body=None, symmetry=symmetry, system=system)
     if "bare_compliance" not in arrays:
         return problem
-    without = replace(
-        system,
-        delassus=arrays["bare_compliance"].reshape(c, d, c, d),
-        reading_rows=arrays["bare_reading_rows"].reshape(len(model.columns), c * d),
-    )
+    rows = arrays["bare_reading_rows"].reshape(len(model.columns), c * d)
+    without = replace(system, delassus=arrays["bare_compliance"].reshape(c, d, c, d), reading_rows=rows)
     return replace(problem, without_inclusions=replace(problem, system=without))
 
 
@@ -240,10 +227,9 @@ class ReducedModel:
         if not model.is_linear_elastic:
             slots = dict(model.filled)
             name = slots.get("hyperelastic_law") or slots.get("relaxation", "its formulation")
-            raise Finger3dError(
-                f"effects.{name}: a body with it has no reduced model, its compliance is not constant; "
-                "condense the scene with effects.auto = false and without the effect, or press the scene itself"
-            )
+            advice = "condense the scene with effects.auto = false and without the effect, or press the scene itself"
+            why = "a body with it has no reduced model, its compliance is not constant"
+            raise Finger3dError(f"effects.{name}: {why}; {advice}")
         if model.centre_of_mass_mm is not None:
             raise Finger3dError("[grip]: two fingers have no reduced model; press the scene itself")
         others = beyond_candidates(problem)
@@ -255,9 +241,8 @@ class ReducedModel:
         }
         size = DesignSummary(float(model.design.height_mm), float(model.design.width_mm))
         light = replace(model, design=size, inclusions=None, object_compliance=None, symmetry=problem.axes, parts=())
-        return cls(
-            assembled(light, arrays_of(problem), problem.system.first_contact_mm, problem.axes), bare(others), about
-        )
+        own = assembled(light, arrays_of(problem), problem.system.first_contact_mm, problem.axes)
+        return cls(own, bare(others), about)
 
     @property
     def gauges(self) -> tuple[str, ...]:
@@ -296,24 +281,17 @@ class ReducedModel:
 
     def _check(self, legs: tuple[Leg, ...]) -> None:
         """Raise Finger3dError if contact could leave the candidate points."""
-        problem = self.problem
+        problem, mirrored = self.problem, "press: the body was condensed as a mirror image"
         for leg in legs:
             if not all(math.isfinite(getattr(leg, k)) for k in _PATH) or leg.depth_mm < 0.0:
-                raise Finger3dError(
-                    f"press: depth {leg.depth_mm} mm, slides {leg.slide_x_mm}, {leg.slide_z_mm} mm: must be finite "
-                    "numbers, the depth from 0 up"
-                )
+                given = f"depth {leg.depth_mm} mm, slides {leg.slide_x_mm}, {leg.slide_z_mm} mm"
+                raise Finger3dError(f"press: {given}: must be finite numbers, the depth from 0 up")
             if problem.axes and any((leg.turn_x, leg.turn_y, leg.turn_z)):
-                raise Finger3dError(
-                    "press: the body was condensed as a mirror image and its object cannot turn; condense a scene with "
-                    "this turn"
-                )
+                raise Finger3dError(f"{mirrored} and its object cannot turn; condense a scene with this turn")
             for axis in problem.axes:
                 if getattr(leg, f"slide_{axis}_mm"):
-                    raise Finger3dError(
-                        f"press: the body was condensed as a mirror image about {axis} = 0 and cannot slide along "
-                        f"{axis}; condense a scene with this slide"
-                    )
+                    advice = "condense a scene with this slide"
+                    raise Finger3dError(f"{mirrored} about {axis} = 0 and cannot slide along {axis}; {advice}")
         if problem.dim == 2 and any(leg.slide_z_mm for leg in legs):
             raise Finger3dError("press: a section cannot slide along z; condense a solid")
         if not len(self.others.nodes):
@@ -322,9 +300,9 @@ class ReducedModel:
         deepest = max(t.depth_mm for t in path)
         nearest = min(float(rigid_gap(problem.placed(t), self.others).min()) for t in path)
         if nearest < _GAP_LEFT * deepest:
+            what = f"contact may leave the {self.contact_points} points that were condensed"
             raise Finger3dError(
-                f"press: at depth {deepest:g} mm contact may leave the {self.contact_points} points that were "
-                "condensed; press less, or condense a scene that goes as far"
+                f"press: at depth {deepest:g} mm {what}; press less, or condense a scene that goes as far"
             )
 
     def save(self, path: str | Path) -> Path:

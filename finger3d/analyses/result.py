@@ -93,10 +93,8 @@ def result_in(
     try:
         steps_of(numbers)
     except TypeError as error:
-        raise Finger3dError(
-            f"{folder / 'summary.json'}: its steps are damaged, or of another version of finger3d ({error}); press "
-            f"{folder}/scene.toml again"
-        ) from None
+        why = f"its steps are damaged, or of another version of finger3d ({error})"
+        raise Finger3dError(f"{folder / 'summary.json'}: {why}; press {folder}/scene.toml again") from None
     tables = {name: read_columns(folder / f"{name}.csv") for name in _TABLES}
     return PressResult(folder, history, numbers, tables, temporary)
 

@@ -95,17 +95,12 @@ class Sensitivity:
 
     def rows(self) -> list[Tree]:
         """Return a row for each number and key, those first that change the number most."""
-        return [
-            {
-                "number": name,
-                "key": key,
-                "value": self.keys[key],
-                "change": self.changes[key],
-                **effect._asdict(),
-            }
-            for name, by_key in self.effects.items()
-            for key, effect in sorted(by_key.items(), key=lambda item: -largest(item[1]))
-        ]
+        rows = list[Tree]()
+        for name, by_key in self.effects.items():
+            for key, effect in sorted(by_key.items(), key=lambda item: -largest(item[1])):
+                change = {"value": self.keys[key], "change": self.changes[key]}
+                rows.append({"number": name, "key": key, **change, **effect._asdict()})
+        return rows
 
 
 def largest(effect: Effect) -> float:
@@ -231,11 +226,9 @@ def effects_on(
             told = [f"{way}: {side}" for way, side in zip(_WAYS, sides, strict=True) if isinstance(side, str)]
             failures |= {key: "; ".join(told)} if told else {}
             if len(told) < len(sides):
-                parts = [
-                    part
-                    for k, side in enumerate(sides)
-                    for part in (side if isinstance(side, dict) else {}, _errors(own, others, (key, k)))
-                ]
+                parts = list[dict[str, float]]()
+                for k, side in enumerate(sides):
+                    parts += [side if isinstance(side, dict) else {}, _errors(own, others, (key, k))]
                 found[key] = {name: Effect(*(part.get(name, math.nan) for part in parts)) for name in own.numbers}
     return found, failures
 
@@ -262,12 +255,9 @@ def _errors(own: Differences, others: Sequence[tuple[float, Differences]], at: t
 def differences(problem: Problem, changes: Mapping[str, KeyChange]) -> Differences:
     """Press a problem and its variants; those that change readings only are read in the problem's own press."""
     own, mesh = problem.model, problem.model.mesh
-    ends = {
-        (key, side): replace(end, mesh=mesh, symmetry=own.symmetry)
-        for key, one in changes.items()
-        for side, end in enumerate(one.ends)
-        if isinstance(end, Model)
-    }
+    both = {(key, side): end for key, one in changes.items() for side, end in enumerate(one.ends)}
+    told = {at: end for at, end in both.items() if isinstance(end, Model)}
+    ends = {at: replace(end, mesh=mesh, symmetry=own.symmetry) for at, end in told.items()}
     scaled = {at for at in ends if at[0] == _STIFFNESS and own.forces_scale_with_modulus}
     read = {at for at, end in ends.items() if _changes_readings_only(own, end)}
     pressed = [at for at in ends if at not in read | scaled]
@@ -275,9 +265,7 @@ def differences(problem: Problem, changes: Mapping[str, KeyChange]) -> Differenc
     if base.found is None:
         raise Finger3dError(f"sensitivity: {base.failure}")
     numbers, last = base.found
-    sides: dict[tuple[str, int], Side] = {
-        (key, side): end for key, one in changes.items() for side, end in enumerate(one.ends) if isinstance(end, str)
-    }
+    sides: dict[tuple[str, int], Side] = {at: end for at, end in both.items() if isinstance(end, str)}
     for at, variant in zip(pressed, variants, strict=True):
         sides[at] = _less(variant.found[0], numbers) if variant.found else variant.failure
     for at in read:

@@ -14,8 +14,10 @@ from finger3d._extras import absent, message
 from finger3d._interruption import termination_interrupts
 from finger3d._machine import enough_address_space
 from finger3d.cli.common import Interrupted, app
-from finger3d.cli.options import gone
-from finger3d.cli.printing import complain, fill_descriptors, least_width, safe_streams
+from finger3d.cli.gone import gone
+from finger3d.cli.printing import complain
+from finger3d.cli.streams import safe_streams
+from finger3d.cli.terminal import fill_descriptors, least_width
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
 
 _COMMANDS = (

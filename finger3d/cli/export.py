@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import app, check_folder, job, load
+from finger3d.cli.common import app, job, load
+from finger3d.cli.folders import check_folder
 from finger3d.cli.options import Flag, Json, Set
 from finger3d.cli.printing import print_json, print_rows
 from finger3d.errors import Finger3dError

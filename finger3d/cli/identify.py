@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.cli.common import app, check_writable, job
+from finger3d.cli.common import app, job
+from finger3d.cli.folders import check_writable
 from finger3d.cli.options import Continued, Json, Paths, Set, Texts
 from finger3d.cli.printing import print_json, print_page
 

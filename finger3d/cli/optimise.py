@@ -8,7 +8,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import app, check_writable, job
+from finger3d.cli.common import app, job
+from finger3d.cli.folders import check_writable
 from finger3d.cli.options import Continued, Json, Noise, Set, Texts, Tolerances, parsed_tolerances
 from finger3d.cli.printing import print_json, print_page
 

@@ -1,4 +1,4 @@
-"""Options that several commands share, and those that are gone, with what to do instead."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import CycloptsError, Parameter, UnknownOptionError
+from cyclopts import Parameter
 
 from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.errors import Finger3dError
@@ -40,34 +40,6 @@ Out = Annotated[Path, Parameter(help="Folder for the results.")]
 Continued = Annotated[Path, Parameter(help="Folder for the results; what was interrupted continues there.")]
 
 Noise = Annotated[float, Parameter(help="Standard deviation of a strain reading; the default is that of Maeno 2004.")]
-
-
-@dataclass(frozen=True, kw_only=True)
-class CalibrationOptions:
-    """What is calibrated, and how well readings and scene are known.
-
-    Parameters
-    ----------
-    gauge
-        Name of a [[gauge]] of the scene; or several readings together, with commas: gauges, m1.x of a
-        [[marker]], taxels.
-    mu
-        Values of mu: first:last:count, or numbers separated by commas.
-    marker_noise
-        Standard deviation of a reading of a marker, mm.
-    taxel_noise
-        Standard deviation of a reading of a taxel, MPa.
-    resolution
-        Largest standard deviation of mu at which the sensor is usable.
-    """
-
-    gauge: str
-    mu: str = "0.02:1.2:25"
-    noise: Noise = 1.5e-4
-    marker_noise: float = 0.02
-    taxel_noise: float = 1e-3
-    resolution: float = 0.1
-    tolerance: Tolerances = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,53 +88,3 @@ def parsed_tolerances(texts: Sequence[str] | None) -> dict[str, float]:
         except ValueError:
             raise Finger3dError(f"--tolerance {text}: must be NAME=NUMBER, for instance depth_mm=0.05") from None
     return stds
-
-
-COMMANDS = {
-    "completion": "use finger3d --completion SHELL",
-    "design": "use finger3d optimise",
-    "schema": "use finger3d new --schema",
-    "validate": "use python -m validation, from a checkout",
-}
-
-_INSERT = "draw it as a part of the design with [parts.LABEL] rigid = true: it is printed and inserted"
-_PLAIN = "the faces are plain: hold them with --screw, clamps or rubber bands"
-
-OF_EXPORT = {
-    **dict.fromkeys(("--carrier", "--carrier-mm", "--key-mm", "--inserts"), _INSERT),
-    **dict.fromkeys(("--fasten", "--band-mm", "--seal", "--cord-mm", "--pry", "--no-pry"), _PLAIN),
-    **dict.fromkeys(("--plugs", "--no-plugs", "--slot-gap-mm"), "slots of strips are sealed with tape"),
-    "--ascii": "STL files are binary; a program that reads them turns them into text",
-    "--wall-mm": "the walls are 8 mm thick",
-    "--peg-mm": "pegs have a diameter of 4 mm",
-    "--lid-mm": "the lid is 4 mm thick",
-    "--vent-mm": "vents are as wide as the base allows, at most 2 mm",
-    "--foil-length-mm": "give length_mm in [[gauge]]; without it a foil is 5 mm long",
-    **dict.fromkeys(
-        ("--foil-thickness-mm", "--foil-width-mm"),
-        "give them in [effects.embedded_gauge]; without it they are 0.1 and 3 mm",
-    ),
-    "--riser": "the pour hole is a funnel, of the width --pour-mm at the sensor",
-    "--cavities": "print the mold several times",
-    "--coupon": "give the clearance of your printer as --clearance-mm",
-    "--button": "press a sample with a scene of its own, and finger3d identify",
-    "--bed": "the program of the printer arranges the parts",
-}
-
-OPTIONS = {
-    "calibrate": {"--map": "finger3d optimise --gauges 1 maps how well a gauge at each place tells mu"},
-    "estimate": {"--curve": "estimates follow the interpolation of the calibration"},
-    "export": OF_EXPORT,
-    "optimise": {"--objective": "the objective is the sensitivity of a gauge to friction"},
-    "show": {"--gif": "the page of a press has a slider for its increments"},
-}
-
-
-def gone(error: CycloptsError, arguments: Sequence[str]) -> str:
-    """Return what to do instead of a command or an option that is gone; empty for any other mistake."""
-    command = next(iter(arguments), "")
-    if command in COMMANDS:
-        return f"{command} is gone: {COMMANDS[command]}"
-    options = OPTIONS.get(command, {})
-    option = (error.token.keyword or error.token.value).split("=")[0] if isinstance(error, UnknownOptionError) else ""
-    return f"{option} is gone: {options[option]}" if option in options else ""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.cli.common import app, check_writable, job
+from finger3d.cli.common import app, job
+from finger3d.cli.folders import check_writable
 from finger3d.cli.options import Json, Set, Texts, parsed_tolerances
 from finger3d.cli.printing import print_columns, print_json
 
@@ -45,17 +46,11 @@ def sensitivity(
     if json_:
         print_json(found.as_dict())
         return
-    head = ["number", "key", "value", "change", "as it falls", "as it grows"]
-    print_columns(
-        head,
-        [
-            [
-                *(row["number"], row["key"], f"{row['value']:.5g}", f"{row['change']:.3g}"),
-                *(_effect(row[way], row[f"{way}_error"]) for way in ("falling", "growing")),
-            ]
-            for row in found.rows()
-        ],
-    )
+    lines = []
+    for row in found.rows():
+        effects = (_effect(row[way], row[f"{way}_error"]) for way in ("falling", "growing"))
+        lines.append([row["number"], row["key"], f"{row['value']:.5g}", f"{row['change']:.3g}", *effects])
+    print_columns(["number", "key", "value", "change", "as it falls", "as it grows"], lines)
     for key, reason in found.failures.items():
         print(f"{key}: {reason}")
     print(f"results: {out}")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import webbrowser
 from pathlib import Path
 
-from finger3d.cli.common import app, check_folder
+from finger3d.cli.common import app
+from finger3d.cli.folders import check_folder
 from finger3d.errors import Finger3dError
 
 

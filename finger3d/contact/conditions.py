@@ -71,7 +71,6 @@ class ContactProblem:
         delassus: Float,
         law: FrictionLaw,
         length_scale: float,
-        augmentation: Float | None = None,
         area: Float | None = None,
     ) -> ContactProblem:
         """Return the increment from a state.
@@ -80,9 +79,7 @@ class ContactProblem:
         ----------
         free_displacement : (c, d) array, mm
             Gap and tangential displacement relative to the object that the points would have without contact forces.
-        delassus : (c, d, c, d) array, mm/N
-        augmentation : (c, d) array, N/mm, optional
-            By default from the diagonal of a positive definite operator; if given, the operator may be indefinite.
+        delassus : (c, d, c, d) array, mm/N, positive definite
         """
         motion = free_displacement.copy()
         motion[:, 1:] -= previous.tangential_displacement
@@ -94,9 +91,8 @@ class ContactProblem:
             law=law,
             length_scale=length_scale,
             friction=law.coefficients(previous.status, pressure(previous.force, area)),
-            augmentation=augmentation_parameters(matrix, motion.shape[1]) if augmentation is None else augmentation,
+            augmentation=augmentation_parameters(matrix, motion.shape[1]),
             area=area,
-            is_definite=augmentation is None,
         )
 
     @property

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._types import Float, freeze_arrays
+from finger3d._types import Float, Tree, freeze_arrays
 from finger3d.contact.friction import OPEN
 from finger3d.errors import Outcome
 
@@ -47,9 +47,8 @@ class ContactState:
     def at_rest(cls, gap: Float, dim: int) -> ContactState:
         """Return the state without forces and displacements; gap (c,), mm."""
         c = len(gap)
-        return cls(
-            np.full(c, OPEN, dtype=np.int8), np.zeros((c, dim)), gap, np.zeros((c, dim - 1)), np.zeros((c, dim - 1))
-        )
+        still = np.zeros((c, dim - 1))
+        return cls(np.full(c, OPEN, dtype=np.int8), np.zeros((c, dim)), gap, still, still)
 
     @property
     def scene_force(self) -> Float:
@@ -77,14 +76,8 @@ class ContactState:
 
     def of_points(self, points: NDArray[np.intp]) -> ContactState:
         """Return the state of some points (k,)."""
-        return ContactState(
-            self.status[points],
-            self.force[points],
-            self.gap[points],
-            self.tangential_displacement[points],
-            self.accumulated_slip[points],
-            None if self.bases is None else self.bases[points],
-        )
+        parts: Tree = {name: None if values is None else values[points] for name, values in vars(self).items()}
+        return ContactState(**parts)
 
 
 SNAPPED = "snapped"

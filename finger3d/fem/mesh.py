@@ -139,9 +139,8 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
     if degree == 2:
         a = 2.0 / 3.0 if dim == 2 else (5.0 + 3.0 * math.sqrt(5.0)) / 20.0
         b = (1.0 - a) / dim
-        return np.full((dim + 1, dim + 1), b) + (a - b) * np.eye(dim + 1), np.full(
-            dim + 1, 1.0 / math.factorial(dim + 1)
-        )
+        weight = 1.0 / math.factorial(dim + 1)
+        return np.full((dim + 1, dim + 1), b) + (a - b) * np.eye(dim + 1), np.full(dim + 1, weight)
     if degree == 5 and dim == 2:
         root = math.sqrt(15.0)
         orbits = [(6.0 - root) / 21.0, (6.0 + root) / 21.0]
@@ -336,12 +335,8 @@ def quadratic(mesh: Mesh) -> Mesh:
         ordered = np.sort(simplices[:, edges], axis=2)
         return n + np.searchsorted(edge_keys, ordered[..., 0] * n + ordered[..., 1])
 
-    facets = {
-        label: np.hstack([f, mid_nodes(f, EDGES[d - 1])])
-        if len(f)
-        else np.zeros((0, 3 if d == 2 else 6), dtype=np.int64)
-        for label, f in mesh.facets.items()
-    }
+    facets = {label: np.zeros((0, 3 if d == 2 else 6), dtype=np.int64) for label in mesh.facets}
+    facets |= {label: np.hstack([f, mid_nodes(f, EDGES[d - 1])]) for label, f in mesh.facets.items() if len(f)}
     cells = np.hstack([mesh.cells, n + number.reshape(key.shape)])
     return replace(mesh, points=np.vstack([mesh.points, mids]), cells=cells, facets=facets)
 
@@ -412,10 +407,8 @@ def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
         off = np.abs(mesh.points[:, axis]) > 0.0
         image = np.where(off, n + np.cumsum(off) - 1, np.arange(n))
         other = reflected(mesh, axis)
-        plane = "symmetry_" + "xyz"[axis]
-        facets = {
-            label: np.vstack([f, image[other.facets[label]]]) for label, f in mesh.facets.items() if label != plane
-        }
+        kept = {label: f for label, f in mesh.facets.items() if label != "symmetry_" + "xyz"[axis]}
+        facets = {label: np.vstack([f, image[other.facets[label]]]) for label, f in kept.items()}
         cells = np.vstack([mesh.cells, image[other.cells]])
         part = None if mesh.part is None else np.tile(mesh.part, 2)
         points = np.vstack([mesh.points, other.points[off]])
@@ -456,10 +449,8 @@ def curved_volume(mesh: Mesh) -> float:
 
 def curved_jacobians(mesh: Mesh) -> Float:
     """Smallest Jacobian determinant (e,) over the nodes and the centre of each quadratic cell, mm^d."""
-    d = mesh.dim
-    return np.asarray(
-        _determinants(mesh, np.vstack([mesh.element.nodes, np.full((1, d + 1), 1.0 / (d + 1))])).min(axis=0)
-    )
+    middle = np.full((1, mesh.dim + 1), 1.0 / (mesh.dim + 1))
+    return np.asarray(_determinants(mesh, np.vstack([mesh.element.nodes, middle])).min(axis=0))
 
 
 def most_distorted(mesh: Mesh, u: Float) -> tuple[int, float]:

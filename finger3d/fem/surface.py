@@ -29,6 +29,9 @@ from finger3d.geometry.surface import Triangles
 
 _SURFACE_DEGREE = 5  # hats times quadratic traces are cubic, curvature adds a little
 
+OF_POINTS = "nodes", "face", "points", "area", "normals"
+"""Arrays of a `BoundarySurface` with an entry for each point."""
+
 
 @dataclass(frozen=True)
 class BoundarySurface:
@@ -168,14 +171,10 @@ def joined(surfaces: Sequence[BoundarySurface]) -> BoundarySurface:
     def blocks(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
         return sp.csr_matrix(sp.block_diag(parts, format="csr"))
 
+    arrays = {name: np.concatenate([getattr(s, name) for s in surfaces]) for name in (*OF_POINTS, "samples")}
     return BoundarySurface(
-        nodes=np.concatenate([s.nodes for s in surfaces]),
-        face=np.concatenate([s.face for s in surfaces]),
-        points=np.concatenate([s.points for s in surfaces]),
-        area=np.concatenate([s.area for s in surfaces]),
-        normals=np.concatenate([s.normals for s in surfaces]),
+        **arrays,
         trace=rows([s.trace for s in surfaces]),
-        samples=np.concatenate([s.samples for s in surfaces]),
         average=blocks([s.average for s in surfaces]),
         interpolate=rows([s.interpolate for s in surfaces]),
         hats=blocks([s.hats for s in surfaces]),
@@ -196,12 +195,7 @@ def restrict(surface: BoundarySurface, keep: NDArray[np.bool_] | Int) -> Boundar
     used = np.unique(average.indices)
     return replace(
         surface,
-        nodes=surface.nodes[keep],
-        face=surface.face[keep],
-        points=surface.points[keep],
-        area=surface.area[keep],
-        normals=surface.normals[keep],
-        trace=surface.trace[keep],
+        **{name: getattr(surface, name)[keep] for name in (*OF_POINTS, "trace")},
         samples=surface.samples[used],
         average=average[:, used],
         interpolate=surface.interpolate[used],
@@ -531,11 +525,9 @@ class DeformedContact:
 
 def deformed_contact(
     face: BoundarySurface,
-    *,
     points: Float,
     displacement: Float,
-    gap: Float,
-    normal: Float,
+    distance: tuple[Float, Float],
     axes: tuple[str, ...],
     object_share: Float | None = None,
 ) -> DeformedContact:
@@ -545,17 +537,15 @@ def deformed_contact(
     ----------
     points, displacement : (n, d) arrays, mm
         Nodes of the mesh at rest, and their displacement.
-    gap : (q,) array, mm
-        Gap at the samples.
-    normal : (q, d) array
-        Unit normals into the body at the samples, along which the gap is measured.
+    distance : (q,) array, mm, and (q, d) array
+        Gap at the samples, and the unit normals into the body there, along which it is measured.
     axes : tuple of str
         Normals of the symmetry planes, in which the normals of points on them lie.
     object_share : (c,) array, optional
         Share of an elastic object in the compliance of each point; the common normal turns from that of the object
         towards that of the body by this share.
     """
-    area = _Area.of(face, points, displacement)
+    area, (gap, normal) = _Area.of(face, points, displacement), distance
     total = (face.average @ area.ratio)[:, None]
 
     def mean_of(normals: Float) -> Float:

@@ -81,9 +81,8 @@ def sound(shape: Part | Shape, name: str) -> Solid:
     """
     solids = shape.solids()
     if len(solids) != 1 or not solids[0].is_valid or not solids[0].volume > 0.0:
-        raise Finger3dError(
-            f"{name}: CAD made {len(solids)} solids, or an invalid one, of these dimensions; change them"
-        )
+        made = f"CAD made {len(solids)} solids, or an invalid one, of these dimensions"
+        raise Finger3dError(f"{name}: {made}; change them")
     solid = solids[0]
     solid.label = name
     labels = {face.label for face in labelled_faces(solid)}
@@ -270,9 +269,8 @@ def check_gaps(glued: Glued, solids: Sequence[Solid], name: str) -> None:
         # not beside a thin part
         facing = glued_face.face.normal_at(Vector(*place)).dot(there - Vector(*place)) >= 0.5 * gap
         if gap < least and facing:
-            raise Finger3dError(
-                f"{name}: {_apart(gap, place)}; draw them with common faces, or a gap that can be meshed"
-            )
+            advice = "draw them with common faces, or a gap that can be meshed"
+            raise Finger3dError(f"{name}: {_apart(gap, place)}; {advice}")
 
 
 def apart(a: Solid, b: Solid) -> str:
@@ -302,7 +300,6 @@ def _inner_point(face: Face) -> tuple[float, float, float]:
         return float(abs((b.X() - a.X()) * (c.Y() - a.Y()) - (c.X() - a.X()) * (b.Y() - a.Y())))
 
     largest = max(corners, key=area)
-    point = BRepAdaptor_Surface(face.wrapped).Value(
-        math.fsum(p.X() for p in largest) / 3.0, math.fsum(p.Y() for p in largest) / 3.0
-    )
+    u, v = math.fsum(p.X() for p in largest) / 3.0, math.fsum(p.Y() for p in largest) / 3.0
+    point = BRepAdaptor_Surface(face.wrapped).Value(u, v)
     return point.X(), point.Y(), point.Z()

@@ -95,9 +95,8 @@ class Faceted:
         if not bent.any():
             return math.inf
         area = np.linalg.norm(self.triangles.area_vectors, axis=1)
-        across = (area[a] + area[b]) / np.linalg.norm(
-            self.triangles.points[edge[:, 1]] - self.triangles.points[edge[:, 0]], axis=1
-        )
+        start, end = (self.triangles.points[edge[:, k]] for k in (0, 1))
+        across = (area[a] + area[b]) / np.linalg.norm(end - start, axis=1)
         return float(np.quantile(across[bent] / angle[bent], 0.05))
 
     def distance(self, points: Float) -> tuple[Float, Float]:

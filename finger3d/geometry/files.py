@@ -20,6 +20,7 @@ from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles, connected, has_three_corners
 from finger3d.geometry.surface_checks import crossings, mistake
+from finger3d.io import file_bytes
 
 if TYPE_CHECKING:
     from build123d import Compound, Face, Solid
@@ -73,37 +74,26 @@ def _check_crossings(path: Path, surface: Triangles) -> None:
     crossed = crossings(surface)
     if len(crossed):
         place = surface.corners[crossed[0]].mean(axis=0)
-        raise Finger3dError(
-            f"{path}: the body's surface runs through itself at {len(crossed)} triangles, the first near "
-            f"({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) mm; mend it where it was drawn"
-        )
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise Finger3dError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
+        near = f"({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) mm; mend it where it was drawn"
+        what = f"the body's surface runs through itself at {len(crossed)} triangles"
+        raise Finger3dError(f"{path}: {what}, the first near {near}")
 
 
 def content(path: Path) -> str:
     """Return the SHA-256 of a file."""
     import hashlib
 
-    return hashlib.sha256(_bytes(path)).hexdigest()
+    return hashlib.sha256(file_bytes(path)).hexdigest()
 
 
 def _stl(path: Path, scale: float) -> Triangles:
-    content = _bytes(path)
+    content = file_bytes(path)
     points = _binary_stl(path, content) if _is_binary(content) else _text_stl(path, content)
     far = np.isfinite(points) & (np.abs(points) * scale > _LARGEST_COORDINATE_MM)
     if far.any():
-        raise Finger3dError(
-            f"{path}: a point at {points[far].flat[0]:g}: coordinates must be numbers from "
-            f"-{number(_LARGEST_COORDINATE_MM)} to {number(_LARGEST_COORDINATE_MM)} mm; mend it where it was drawn"
-        )
+        most = number(_LARGEST_COORDINATE_MM)
+        allowed = f"coordinates must be numbers from -{most} to {most} mm; mend it where it was drawn"
+        raise Finger3dError(f"{path}: a point at {points[far].flat[0]:g}: {allowed}")
     return welded(points, np.arange(len(points)).reshape(-1, 3))
 
 
@@ -117,16 +107,13 @@ def _is_binary(content: bytes) -> bool:
 def _binary_stl(path: Path, content: bytes) -> Float:
     """Return the corners (3 m, 3) of m triangles, one triangle after the other."""
     if len(content) < _STL_HEADER:
-        raise Finger3dError(
-            f"{path}: this is no STL file: it has {len(content)} bytes, and does not begin with 'solid'"
-        )
+        has = f"it has {len(content)} bytes, and does not begin with 'solid'"
+        raise Finger3dError(f"{path}: this is no STL file: {has}")
     count = int.from_bytes(content[_STL_COUNT], "little")
     held = (len(content) - _STL_HEADER) // _STL_FACET.itemsize
     if held < count:
-        raise Finger3dError(
-            f"{path}: the header of this binary STL file announces {count} triangles, and {held} follow: it was cut "
-            "off, or is no STL file; copy or export it again"
-        )
+        what = f"the header of this binary STL file announces {count} triangles, and {held} follow"
+        raise Finger3dError(f"{path}: {what}: it was cut off, or is no STL file; copy or export it again")
     _check_triangles(path, count)
     return np.frombuffer(content, _STL_FACET, count, _STL_HEADER)["corners"].reshape(-1, 3).astype(float)
 
@@ -135,10 +122,8 @@ def _text_stl(path: Path, content: bytes) -> Float:
     """Return the corners (3 m, 3) of the triangles of all solids, which together make one body."""
     count, vertices = (len(re.findall(rb"(?im)^\s*" + word, content)) for word in (rb"end\s*facet", rb"vertex\s"))
     if vertices != 3 * count:
-        raise Finger3dError(
-            f"{path}: this STL text has {count} whole facets and {vertices} vertices, where a facet has three: it was "
-            "cut off or damaged; export it again"
-        )
+        what = f"this STL text has {count} whole facets and {vertices} vertices, where a facet has three"
+        raise Finger3dError(f"{path}: {what}: it was cut off or damaged; export it again")
     if not re.search(rb"(?im)^\s*end\s*solid[^\n]*\s*\Z", content):
         raise Finger3dError(f"{path}: this STL text does not end with 'endsolid': it was cut off; export it again")
     _check_triangles(path, count)
@@ -155,10 +140,8 @@ def _check_triangles(path: Path, count: int) -> None:
     if not count:
         raise Finger3dError(f"{path}: this STL file holds no triangles")
     if count > MOST_TRIANGLES:
-        raise Finger3dError(
-            f"{path}: {count} triangles; must be at most {MOST_TRIANGLES}: triangles much smaller than "
-            "mesh.size_mm do not change the mesh; export it coarser, or simplify it"
-        )
+        why = "triangles much smaller than mesh.size_mm do not change the mesh; export it coarser, or simplify it"
+        raise Finger3dError(f"{path}: {count} triangles; must be at most {MOST_TRIANGLES}: {why}")
 
 
 def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
@@ -219,7 +202,7 @@ def read_step(path: Path) -> StepBody:
     Finger3dError
         If this is no STEP file, or holds no solid or an invalid one.
     """
-    size = len(_bytes(path))
+    size = len(file_bytes(path))
     require(f"{path}: a STEP file", "build123d")
     from build123d import Compound
     from OCP.BinTools import BinTools
@@ -230,10 +213,8 @@ def read_step(path: Path) -> StepBody:
     try:
         read = in_child(_step.read, _STEP_S + _STEP_S_PER_BYTE * size, path=str(path.resolve()))
     except ChildError as error:
-        raise Finger3dError(
-            f"{path}: OpenCASCADE {error} on this STEP file, which is damaged or too complex; export it again where it "
-            "was drawn"
-        ) from None
+        why = f"OpenCASCADE {error} on this STEP file, which is damaged or too complex"
+        raise Finger3dError(f"{path}: {why}; export it again where it was drawn") from None
     if read["error"]:
         raise Finger3dError(f"{path}: {read['error']}")
     shape = TopoDS_Shape()

@@ -318,19 +318,13 @@ def contact_table(points: ContactPoints, step: StepResult) -> Tree:
     normal = _normals(points, state)
     return {
         "face": [FREE_FACES[k] for k in points.face],
-        "x_mm": points.points[:, 0],
-        "y_mm": points.points[:, 1],
-        "z_mm": points.points[:, 2],
+        **{f"{axis}_mm": points.points[:, k] for k, axis in enumerate("xyz")},
         "area_mm2": points.area,
         **{f"normal_{axis}": normal[:, k] for k, axis in enumerate("xyz")},
         "pressure_MPa": state.force[:, 0] / points.area,
-        "shear_x_MPa": friction[:, 0] / points.area,
-        "shear_y_MPa": friction[:, 1] / points.area,
-        "shear_z_MPa": friction[:, 2] / points.area,
+        **{f"shear_{axis}_MPa": friction[:, k] / points.area for k, axis in enumerate("xyz")},
         "gap_mm": state.gap,
-        "slip_x_mm": slip[:, 0],
-        "slip_y_mm": slip[:, 1],
-        "slip_z_mm": slip[:, 2],
+        **{f"slip_{axis}_mm": slip[:, k] for k, axis in enumerate("xyz")},
         "margin": margins(points, state, step.friction),
         "status": [STATUS_NAMES[s] for s in state.status],
     }
@@ -459,11 +453,8 @@ def _gross_slip(points: ContactPoints, steps: Sequence[StepResult], margin: Floa
         if step.outcome is Outcome.SLIPS:
             return SlipEvent(number + 1, 0.0)
         along = np.delete(Move(_pose_before(steps, number), step.target).change, [0, TIME])
-        if (
-            margin[number] > 0.0
-            or np.abs(along).max() <= ROUND_OFF
-            or not limits(points, step.state, step.friction).any()
-        ):
+        held = margin[number] > 0.0 or not limits(points, step.state, step.friction).any()
+        if held or np.abs(along).max() <= ROUND_OFF:
             continue
         known = number > 1 and margin[number - 1] > 0.0
         share = _share(left[number - 2], left[number - 1], _ratio(steps, number)) if known else 1.0
@@ -508,10 +499,8 @@ def _entry(points: ContactPoints, steps: Sequence[StepResult], event: SlipEvent,
         move, share = Move(_pose_before(steps, number), steps[number].target), increments - number
         return pose_entry(move.at(min(max(share, 0.0), 1.0)))
 
-    at, where = (
-        pose(event.increments),
-        {} if event.point is None else dict(zip(_PLACE, points.points[event.point].tolist(), strict=True)),
-    )
+    at = pose(event.increments)
+    where = {} if event.point is None else dict(zip(_PLACE, points.points[event.point].tolist(), strict=True))
     if error is None:
         return {"step": event.step, **at, **where}
     ends = [pose(event.increments - error), pose(event.increments + error)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Literal
@@ -84,6 +84,15 @@ class Leg:
         return ObjectPose(
             self.depth_mm, self.slide_x_mm, self.slide_z_mm, time_s, self.turn_x, self.turn_y, self.turn_z
         )
+
+
+def ways(legs: Iterable[Leg]) -> Iterator[tuple[Leg, Move]]:
+    """Yield each leg of a path with the motion from its start to its end."""
+    start = ObjectPose(0.0)
+    for leg in legs:
+        end = leg.end(start)
+        yield leg, Move(start, end)
+        start = end
 
 
 @dataclass(frozen=True)
@@ -272,13 +281,11 @@ def contact_path(
 
     An elastic object, which is not `rigid`, touches the contact face only.
     """
-    pose, poses, by_force = ObjectPose(0.0), list[ObjectPose](), list[ObjectPose]()
-    for leg in legs:
-        end = leg.end(pose)
-        on_leg = [Move(pose, end).at(share) for share in (0.25, 0.5, 0.75, 1.0)]
+    poses, by_force = list[ObjectPose](), list[ObjectPose]()
+    for leg, way in ways(legs):
+        on_leg = [way.at(share) for share in (0.25, 0.5, 0.75, 1.0)]
         poses += on_leg
         by_force += on_leg if leg.force_N is not None else []
-        pose = end
     return ContactPath(
         top=design.top,
         object=obj,

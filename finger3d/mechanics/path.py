@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.mechanics.model import Leg
-from finger3d.objects import Move, ObjectPose
+from finger3d.mechanics.model import Leg, ways
+from finger3d.objects import ObjectPose
 
 AUTO_START = 10
 """Increments that ``steps = "auto"`` begins with."""
@@ -52,16 +52,13 @@ class Station:
 def stations(legs: tuple[Leg, ...]) -> list[Station]:
     """Return the stations at the ends of all increments of the legs, in order."""
     out: list[Station] = []
-    start = ObjectPose(0.0)
-    for leg in legs:
+    for leg, way in ways(legs):
         count = leg.steps if isinstance(leg.steps, int) else AUTO_START
-        end = leg.end(start)
         shares = tuple(k / count for k in range(1, count + 1))
         for share in shares:
-            pose = Move(start, end).at(share) if share < 1.0 else end
+            pose = way.at(share) if share < 1.0 else way.end
             load = Load(np.array(leg.forces, dtype=float), share, share == shares[0]) if leg.is_under_force else None
             out.append(Station(pose, load, share))
-        start = end
     return out
 
 
@@ -86,14 +83,12 @@ def ending_at(legs: tuple[Leg, ...], name: str, values: Float) -> tuple[Leg, ...
     values : (n,) of it
     """
     out: list[Leg] = []
-    start = ObjectPose(0.0)
-    for leg in legs:
-        end = leg.end(start)
-        begin, change = getattr(start, name), getattr(end, name) - getattr(start, name)
+    for leg, way in ways(legs):
+        begin, change = getattr(way.start, name), getattr(way.end, name) - getattr(way.start, name)
         shares = (values - begin) / change if change and not leg.is_under_force else np.zeros(0)
         inner = np.unique(shares[(shares > _SHORTEST) & (shares < 1.0 - _SHORTEST)])
         for before, share in pairwise([0.0, *inner.tolist(), 1.0]):
-            pose = Move(start, end).at(share) if share < 1.0 else end
+            pose = way.at(share) if share < 1.0 else way.end
             part = replace(leg, **{key: getattr(pose, key) for key in _COORDINATES})
             if leg.duration_s is not None:
                 part = replace(part, duration_s=(share - before) * leg.duration_s)
@@ -101,5 +96,4 @@ def ending_at(legs: tuple[Leg, ...], name: str, values: Float) -> tuple[Leg, ...
                 count = leg.steps if isinstance(leg.steps, int) else AUTO_START
                 part = replace(part, steps=max(1, math.ceil((share - before) * count - _SHORTEST)))
             out.append(part)
-        start = end
     return tuple(out)

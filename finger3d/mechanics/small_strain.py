@@ -130,16 +130,9 @@ def passes_through(problem: Problem, move: Move, before: Float, after: Float, ga
 def pulls(problem: Problem, before: ContactState, after: ContactState, move: Move) -> bool:
     """Return whether a convex object that only moves deeper begins to pull the finger, which it cannot."""
     thing = problem.model.object
-    moved = move.end.displacement - move.start.displacement
-    if (
-        thing.is_flat
-        or problem.system.second is not None
-        or not thing.is_convex
-        or move.start.turns != move.end.turns
-        or moved[0]
-        or moved[2]
-        or moved[1] >= 0.0
-    ):
+    along_x, up, along_z = move.end.displacement - move.start.displacement
+    only_deeper = move.start.turns == move.end.turns and up < 0.0 and not (along_x or along_z)
+    if thing.is_flat or not thing.is_convex or problem.system.second is not None or not only_deeper:
         return False
     normal = [float(problem.world_force(state)[:, 1].sum()) for state in (before, after)]
     return normal[0] <= 0.0 < normal[1] - _TOUCHES * float(np.abs(after.force).max(initial=0.0))
@@ -330,9 +323,8 @@ class Increment:
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
         delassus = rotated_delassus(self.body.delassus, rotations[near], near)
-        contact = ContactProblem.of(
-            start.of_points(near), free_displacement[near], delassus, law, scale, area=area[near]
-        )
+        touched = start.of_points(near)
+        contact = ContactProblem.of(touched, free_displacement[near], delassus, law, scale, area[near])
         at = problem.surface.centroids[near] + expansion_point[near]
         increment, part = self._solved(contact, expected[near], bases[near], at)
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)

@@ -331,15 +331,12 @@ class Viscoelastic:
         first = len(condensed) - len(springs)
         if len(springs):
             moved = moved + condensed[:, first:] @ spring_forces(condensed, springs, moved)
-        c, d = len(problem.surface.nodes), problem.dim
-        past = np.zeros(c * d)
-        past[problem.system.active_dofs] = moved[: len(problem.system.active_dofs)]
-        # an elastic object does not relax
-        rest = problem.delassus - scatter_to_points(
-            stiffened(problem.body.condensed.compliance, springs), problem.system.active_dofs, c, d
-        )
-        delassus = scatter_to_points(stiffened(condensed, springs), problem.system.active_dofs, c, d) + rest
-        return body, LinearBody(delassus, past.reshape(c, d))
+        active, size = problem.system.active_dofs, problem.surface.points.shape
+        past = np.zeros(size)
+        past.flat[active] = moved[: len(active)]
+        at_first, now = (stiffened(rows, springs) for rows in (problem.body.condensed.compliance, condensed))
+        rest = problem.delassus - scatter_to_points(at_first, active, *size)  # an elastic object does not relax
+        return body, LinearBody(scatter_to_points(now, active, *size) + rest, past)
 
     def unknowns(self, problem: Problem, states: Sequence[State[ViscousBody]]) -> Iterator[Float]:
         """Yield the unknowns of each state from its internal variables."""

@@ -128,9 +128,8 @@ def _above_and_beside(section: Section, core: Core, part: int) -> Bands:
     border = width / length
 
     def line(u: Float) -> Float:
-        return np.stack(
-            [np.interp(u, [0.0, border, 1.0], [0.0, width, length]), np.full_like(u, core.height_mm)], axis=1
-        )
+        x = np.interp(u, [0.0, border, 1.0], [0.0, width, length])
+        return np.stack([x, np.full_like(u, core.height_mm)], axis=1)
 
     beside = ((border, 1.0, 0),) if border < 1.0 else ()
     above = Band(_between(section.contact.at, line), 1.0, ((0.0, 1.0, 0),), "walls", corner=border if beside else None)
@@ -454,15 +453,12 @@ def _joined(
     bottom = laid[-1].nodes
     if division.walled or division.core:
         points[bottom, 1] = 0.0
+    upward = {label: _edges(nodes)[:, ::-1] for label, nodes in right.items()}
     facets = {
         "contact": _edges(laid[0].part(0.0, 1.0)[0])[:, ::-1],
         "symmetry_x": _edges(first),
-        "base": np.vstack(
-            [_edges(bottom), *(_edges(nodes)[:, ::-1] for label, nodes in right.items() if label == "base")]
-        ),
-        "walls": np.vstack(
-            [_edges(nodes)[:, ::-1] for label, nodes in right.items() if label == "walls"] or [_NO_EDGES]
-        ),
+        "base": np.vstack([_edges(bottom), upward.get("base", _NO_EDGES)]),
+        "walls": upward.get("walls", _NO_EDGES),
     }
     borders = [(section, laid[0])]
     if section.layer:

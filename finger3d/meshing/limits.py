@@ -105,15 +105,10 @@ def check_count(cells: float, dim: int, options: MeshOptions, cap: float = math.
         return
     need, have = mesh_gb(cells, dim), _machine_gb()
     kind = "triangles" if dim == 2 else "tetrahedra"
-    limit = (
-        f"at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB"
-        if need > MEMORY_SHARE * have
-        else f"at most {cap:.0f} {kind}"
-    )
-    raise Finger3dError(
-        f"mesh.size_mm = {options.size_mm:g} with base_size_mm = {options.base_size_mm:g} gives about "
-        f"{cells:.2g} {kind}, forecast {need:.2g} GB; allowed: {limit}; choose larger sizes"
-    )
+    limit = f"{MEMORY_SHARE * have:.1f} GB of {have:.1f} GB" if need > MEMORY_SHARE * have else f"{cap:.0f} {kind}"
+    sizes = f"mesh.size_mm = {options.size_mm:g} with base_size_mm = {options.base_size_mm:g}"
+    forecast = f"{cells:.2g} {kind}, forecast {need:.2g} GB"
+    raise Finger3dError(f"{sizes} gives about {forecast}; allowed: at most {limit}; choose larger sizes")
 
 
 def checked_tets(design: Design, field: Sizing, options: MeshOptions) -> float:

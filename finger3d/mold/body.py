@@ -129,10 +129,9 @@ def write_3mf(path: Path, shells: Mapping[str, Shell]) -> None:
     for name, part in shells.items():
         mesh = model.AddMeshObject()
         mesh.SetName(name)
-        mesh.SetGeometry(
-            [Lib3MF.Position((ctypes.c_float * 3)(*p)) for p in part.surface.points.tolist()],
-            [Lib3MF.Triangle((ctypes.c_uint * 3)(*t)) for t in part.surface.faces.tolist()],
-        )
+        points = [Lib3MF.Position((ctypes.c_float * 3)(*p)) for p in part.surface.points.tolist()]
+        faces = [Lib3MF.Triangle((ctypes.c_uint * 3)(*t)) for t in part.surface.faces.tolist()]
+        mesh.SetGeometry(points, faces)
         model.AddBuildItem(mesh, wrapper.GetIdentityTransform())
     with atomic(path) as temporary:
         temporary.write_bytes(bytes(model.QueryWriter("3mf").WriteToBuffer()))

@@ -56,10 +56,8 @@ class Exported:
     def rows(self) -> list[tuple[str, str]]:
         """The volumes in words."""
         off = self.stl_volume_mm3 / self.volume_mm3 - 1.0
-        rows = [
-            ("volume", f"{self.volume_mm3:.6g} mm3; finger.stl differs by {off:+.1e}"),
-            ("tolerance", f"{self.tolerance_mm:.3g} mm"),
-        ]
+        rows = [("volume", f"{self.volume_mm3:.6g} mm3; finger.stl differs by {off:+.1e}")]
+        rows.append(("tolerance", f"{self.tolerance_mm:.3g} mm"))
         if self.silicone_ml is not None:
             rows.append(("silicone", f"{self.silicone_ml:.3g} ml in the cavity; see sheet.txt"))
         return rows
@@ -140,9 +138,8 @@ def export(
             files += written
             remarks += told
             silicone = assembly.silicone_mm3 / 1e3
-    return Exported(
-        tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
-    )
+    volumes = _volume(design, solid, body), body.surface.volume
+    return Exported(tuple(files), *volumes, body.tolerance_mm, silicone, tuple(remarks))
 
 
 def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> None:
@@ -151,10 +148,8 @@ def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> N
         require("export", "build123d")
     largest = _LARGEST_TOLERANCE * design.height_mm
     if not _LEAST_TOLERANCE_MM <= tolerance_mm <= largest:
-        raise Finger3dError(
-            f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, "
-            "a fifth of the finger's height"
-        )
+        allowed = f"from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, a fifth of the finger's height"
+        raise Finger3dError(f"--tolerance-mm {tolerance_mm}: must be {allowed}")
     if isinstance(design, Imported) and holds(out, ("finger.step", "finger.stl"), design.path):
         raise Finger3dError(f"--out {out}: holds {Path(design.path).name}, the finger's own file; name another folder")
 

@@ -54,14 +54,9 @@ def layout_of(low: Float, high: Float, options: MoldOptions) -> Layout:
     near = PEG_MM + options.gap_mm + around
     far = max(float(high[1]) + away, near)
     rows = (near, far) if far - near >= 2.0 * around else (far,)
-    return Layout(
-        low=low,
-        high=high,
-        outer_low=np.array([low[0] - WALL_MM, 0.0, low[2] - WALL_MM]),
-        outer_high=np.array([high[0] + WALL_MM, max(float(high[1]) + WALL_MM, far + around), high[2] + WALL_MM]),
-        split=options.split_mm * options.scale,
-        rows=rows,
-    )
+    outer_low = np.array([low[0] - WALL_MM, 0.0, low[2] - WALL_MM])
+    outer_high = np.array([high[0] + WALL_MM, max(float(high[1]) + WALL_MM, far + around), high[2] + WALL_MM])
+    return Layout(low, high, outer_low, outer_high, options.split_mm * options.scale, rows)
 
 
 THIN = 0.7

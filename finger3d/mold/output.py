@@ -93,10 +93,8 @@ def as_printed(parts: Mapping[str, Shell]) -> dict[str, Shell]:
 def in_a_row(printed: Mapping[str, Shell]) -> dict[str, Shell]:
     """Return the parts side by side along x; programs of printers arrange them on their beds."""
     starts = np.cumsum([0.0] + [float(part.extent[0]) + GAP_MM for part in printed.values()])
-    return {
-        name: part.moved(np.eye(3), np.array([x, 0.0, 0.0]))
-        for (name, part), x in zip(printed.items(), starts, strict=False)
-    }
+    shifts = np.outer(starts, [1.0, 0.0, 0.0])
+    return {name: part.moved(np.eye(3), by) for (name, part), by in zip(printed.items(), shifts, strict=False)}
 
 
 PAGE = "mold.html"
@@ -129,10 +127,8 @@ def mold_page(
     pictures = [out / f"mold_step_{i}_{step.word}.png" for i, step in enumerate(steps, 1)]
     views = dict(zip(pictures, (step.view for step in steps), strict=True))
     write_pictures({out / "mold.png": _exploded(title, mold, surfaces, printed), **views})
-    sections = [
-        PageSection(f"{i}. {step.title}", [*step.lines, Figure(picture.name, step.title)])
-        for i, (step, picture) in enumerate(zip(steps, pictures, strict=True), 1)
-    ]
+    figures = [Figure(picture.name, step.title) for step, picture in zip(steps, pictures, strict=True)]
+    sections = [PageSection(f"{i}. {step.title}", [*step.lines, figures[i - 1]]) for i, step in enumerate(steps, 1)]
     rows = [(name, sizes(part), f"mold_{name}.stl") for name, part in printed.items()]
     sections += [
         PageSection("Parts", [Table(("part", "size as printed, mm", "file"), rows)]),

@@ -105,10 +105,8 @@ def mold(
         for its openings, or for the reasons of `finger3d.mold.pours.pours`.
     """
     if options.split == "x" and gauges:
-        raise Finger3dError(
-            f'--split x: the strips of gauge "{gauges[0].names[0]}" run along z and would lock halves that open along '
-            "x; use --split z, or a scene without gauges"
-        )
+        why = f'the strips of gauge "{gauges[0].names[0]}" run along z and would lock halves that open along x'
+        raise Finger3dError(f"--split x: {why}; use --split z, or a scene without gauges")
     solids = solids or {}
     silicones = _silicones(shape, solids, rigid, options)
     finger = Body.of(shape, options.machine.tolerance_mm)
@@ -122,24 +120,16 @@ def mold(
     check_foils(body, gauges, options)
     recessed = recesses(finger)
     fillings = [placed(filling, "a recess").solid for filling in recessed]
-    planned = pours(
-        {label: body if cast is shape else placed(cast, label or MAIN) for label, cast in silicones.items()},
-        {label: placed(solids[label], label) for label in rigid},
-        fillings,
-        body,
-        options,
-    )
+    cast = {label: body if one is shape else placed(one, label or MAIN) for label, one in silicones.items()}
+    inserts = {label: placed(solids[label], label) for label in rigid}
+    planned = pours(cast, inserts, fillings, body, options)
     layout = layout_of(*body.box, options)
     slots = {foil: slot(foil, layout, options) for foil in gauges}
     check_strips(planned, slots)
     undercut = check_opening(filled(finger, recessed, options), options, may_turn=not gauges)
     cavity = [] if body.cad is None else [body.cad, *fillings]
-    features = [
-        screws(layout, options),
-        half_pegs(layout, options),
-        lid_pegs(layout, options),
-        Feature(cut=dict.fromkeys(HALVES, [*slots.values(), *cavity])),
-    ]
+    hollows = Feature(cut=dict.fromkeys(HALVES, [*slots.values(), *cavity]))
+    features = [screws(layout, options), half_pegs(layout, options), lid_pegs(layout, options), hollows]
     parts = halves(layout, features)
     for pour in planned:
         parts |= lid_parts(pour, layout, features)
@@ -185,10 +175,9 @@ def filled(finger: Body, fillings: Sequence[Solid], options: MoldOptions) -> Bod
         depth = undercut_depth(Body.of(filling, tolerance).surface, 1, 1.0)
         if depth > max(options.undercut_mm, tolerance):
             center = ", ".join(f"{coordinate:.4g}" for coordinate in filling.center())
-            raise Finger3dError(
-                f"mold: the recess in the base near ({center}) mm widens inside, an undercut of {depth:.2g} mm: the "
-                "lid, which fills it, cannot be pulled out; change the body, or allow it with --undercut-mm"
-            )
+            what = f"the recess in the base near ({center}) mm widens inside, an undercut of {depth:.2g} mm"
+            advice = "change the body, or allow it with --undercut-mm"
+            raise Finger3dError(f"mold: {what}: the lid, which fills it, cannot be pulled out; {advice}")
     return Body.of(one(finger.solid.fuse(*fillings).clean(), "the finger"), tolerance) if fillings else finger
 
 
@@ -207,7 +196,5 @@ def check_split(finger: Body, options: MoldOptions) -> None:
     low, high = finger.box
     axis = 0 if options.split == "x" else 2
     if not low[axis] < options.split_mm < high[axis]:
-        raise Finger3dError(
-            f"--split-mm {options.split_mm:g}: the split plane misses the finger; must be between {low[axis]:.6g} and "
-            f"{high[axis]:.6g} mm along {options.split}"
-        )
+        allowed = f"must be between {low[axis]:.6g} and {high[axis]:.6g} mm along {options.split}"
+        raise Finger3dError(f"--split-mm {options.split_mm:g}: the split plane misses the finger; {allowed}")

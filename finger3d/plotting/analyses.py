@@ -33,24 +33,16 @@ def draw_calibration(path: Path, calibration: Calibration) -> None:
     title = calibration.title if len(calibration.readings) <= _MANY else f"{len(calibration.readings)} readings"
     made = sheet(3, 3, (5.6, 5.0), (0.8, 0.2, 1.5, 0.15), title + (f", {domain}" if domain else ""))
     left, middle, right = made.axes
-    if len(calibration.readings) == 1:
-        curve_panel(left, calibration)
-    else:
-        _changes(left, calibration)
+    (curve_panel if len(calibration.readings) == 1 else _changes)(left, calibration)
     _mu_sd(middle, calibration)
     _reductions(right, calibration)
     made.save(path)
 
 
 def _finish(axes: Axes) -> None:
-    below: dict[str, Any] = {
-        "fontsize": 9,
-        "loc": "upper center",
-        "bbox_to_anchor": (0.5, -0.13),
-        "ncols": 2,
-        "columnspacing": 1.0,
-    }
-    finish(axes, "friction coefficient mu", **(below if axes.get_legend_handles_labels()[0] else {}))
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncols": 2, "columnspacing": 1.0}
+    has_legend = bool(axes.get_legend_handles_labels()[0])
+    finish(axes, "friction coefficient mu", **({"fontsize": 9, **place} if has_legend else {}))
 
 
 def _shade_trusted(axes: Axes, c: Calibration) -> None:
@@ -154,18 +146,9 @@ def _forces(axes: Axes, cases: Sequence[Case], own: Sequence[Case]) -> None:
             value, error = case.numbers[FORCE], case.errors.get(FORCE, 0.0)
             axes.axhspan(value - error, value + error, color=_COLOURS[case.model], alpha=0.15, lw=0)
             axes.axhline(value, color=_COLOURS[case.model], ls="--", lw=1.2, label=case.model)
-    width = [c.width_mm for c in solids]
-    axes.errorbar(
-        width,
-        [c.numbers[FORCE] for c in solids],
-        [c.errors.get(FORCE, 0.0) for c in solids],
-        fmt="o-",
-        ms=5,
-        lw=1.3,
-        capsize=3,
-        color=_COLOURS["solid"],
-        label="solid",
-    )
+    width, force = [c.width_mm for c in solids], [c.numbers[FORCE] for c in solids]
+    bars = [c.errors.get(FORCE, 0.0) for c in solids]
+    axes.errorbar(width, force, bars, fmt="o-", ms=5, lw=1.3, capsize=3, color=_COLOURS["solid"], label="solid")
     if len(width) > 1:
         axes.set_xscale("log")
         axes.set_xticks(width, [f"{w:g}" for w in width])
@@ -190,16 +173,8 @@ def _bars(axes: Axes, own: Sequence[Case]) -> None:
         scale = np.array([solid.numbers[k] for k in keys])
         value = np.array([case.numbers[k] for k in keys]) / scale
         error = np.array([case.errors.get(k, 0.0) for k in keys]) / np.abs(scale)
-        axes.bar(
-            at + (i - 0.5 * (len(own) - 1)) * step,
-            value,
-            0.92 * step,
-            yerr=error,
-            capsize=2,
-            color=_COLOURS[case.model],
-            error_kw={"lw": 0.9},
-            label=case.model,
-        )
+        beside, colour, thin = at + (i - 0.5 * (len(own) - 1)) * step, _COLOURS[case.model], {"lw": 0.9}
+        axes.bar(beside, value, 0.92 * step, yerr=error, capsize=2, color=colour, error_kw=thin, label=case.model)
     axes.axhline(1.0, color="#888888", lw=0.8)
     axes.set_xticks(at, [names[k] for k in keys], fontsize=9)
     axes.margins(y=0.18)
@@ -213,16 +188,8 @@ def _along(axes: Axes, own: Sequence[Case], key: str, label: str) -> None:
         for line, columns in case.lines.items():
             dashes, where = ("-", "") if line == "z = 0" else (":", ", end")
             where = ", z = 0" if case.model == "solid" and line == "z = 0" else where
-            axes.plot(
-                columns["x_mm"],
-                columns[key],
-                dashes,
-                marker=".",
-                ms=3,
-                lw=1.3,
-                color=_COLOURS[case.model],
-                label=case.model + where,
-            )
+            colour, name = _COLOURS[case.model], case.model + where
+            axes.plot(columns["x_mm"], columns[key], dashes, marker=".", ms=3, lw=1.3, color=colour, label=name)
     reach = max((0.6 * c.numbers["contact_length_mm"] for c in own), default=0.0)
     if reach > 0.0:
         axes.set_xlim(-reach, reach)
@@ -301,17 +268,8 @@ def draw_identification(path: Path, panels: Sequence[Panel]) -> None:
         rising = np.argsort(panel.curve_at)
         curve = PchipInterpolator(panel.curve_at[rising], panel.curve[rising])(fine)
         axes.plot(fine, curve, color=_SIMULATED, lw=1.6, label="simulated")
-        axes.errorbar(
-            panel.at,
-            panel.measured,
-            2.0 * panel.std,
-            fmt="o",
-            ms=3.5,
-            lw=1.0,
-            capsize=2.0,
-            color=_MEASURED,
-            label="measured, ±2 sd",
-        )
+        bars, name = 2.0 * panel.std, "measured, ±2 sd"
+        axes.errorbar(panel.at, panel.measured, bars, fmt="o", ms=3.5, lw=1.0, capsize=2.0, color=_MEASURED, label=name)
         finish(axes, panel.index, panel.name, fontsize=9)
         away = (panel.measured - panel.simulated) / panel.std
         residuals[panel.index].plot(panel.at, away, "o-", ms=3, lw=0.8, label=panel.name)
@@ -393,18 +351,11 @@ def draw_places(path: Path, mus: Sequence[float], mu_sd: Float, maps: Sequence[G
     columns = 2 if count in (1, 3) else _COLUMNS
     made = sheet(count + 1, columns, (5.6, 4.6), (0.75, 0.25, 0.6, 0.5))
     every = np.concatenate([one.mean_mu_sd[np.isfinite(one.mean_mu_sd)] for one in maps])
-    low, high = float(every.min()), float(np.quantile(every, _HIGHEST))
+    low = float(every.min())
+    high = max(float(np.quantile(every, _HIGHEST)), 1.001 * low)
     for i, (one, axes) in enumerate(zip(maps, made.axes, strict=False)):
-        drawn = axes.scatter(
-            one.places[:, 0],
-            one.places[:, 1],
-            c=one.mean_mu_sd,
-            s=14,
-            marker="s",
-            cmap="viridis_r",
-            vmin=low,
-            vmax=max(high, 1.001 * low),
-        )
+        x, y, value = one.places[:, 0], one.places[:, 1], one.mean_mu_sd
+        drawn = axes.scatter(x, y, c=value, s=14, marker="s", cmap="viridis_r", vmin=low, vmax=high)
         label = "mean standard deviation of mu"
         made.figure.colorbar(drawn, ax=axes, label=label, location="bottom", shrink=0.8, aspect=35)
         axes.plot(*middle_section(design).T, color="#555555", lw=1.0)

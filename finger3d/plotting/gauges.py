@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -111,17 +111,8 @@ def draw_marks(axes: Axes, marks: Sequence[tuple[str, Float]]) -> None:
     """Draw gauges, each given by its label and its line (3, 2), in mm, with a dot and the label at its middle."""
     from matplotlib.patheffects import withStroke
 
+    edge = withStroke(linewidth=2.5, foreground="#ffffff")
+    below: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "top", "path_effects": [edge]}
     for label, line in marks:
         axes.plot(*line.T, color=COLOUR, lw=2.0, marker="o", markevery=[1], ms=4, solid_capstyle="butt", zorder=5)
-        axes.annotate(
-            label,
-            line[1],
-            (0, -7),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            color=COLOUR,
-            fontsize=10,
-            zorder=6,
-            path_effects=[withStroke(linewidth=2.5, foreground="#ffffff")],
-        )
+        axes.annotate(label, line[1], (0, -7), color=COLOUR, fontsize=10, zorder=6, **below)

@@ -62,17 +62,10 @@ def sheet(
     wide, high = columns * cell[0], rows * cell[1] + (_TITLE_HEIGHT if title else 0.0)
     figure = blank(wide, high)
     left, right, below, above = margins
-    axes = [
-        figure.add_axes(
-            (
-                (column * cell[0] + left) / wide,
-                ((rows - 1 - row) * cell[1] + below) / high,
-                (cell[0] - left - right) / wide,
-                (cell[1] - below - above) / high,
-            )
-        )
-        for row, column in (divmod(number, columns) for number in range(count))
-    ]
+    size, axes = ((cell[0] - left - right) / wide, (cell[1] - below - above) / high), []
+    for row, column in (divmod(number, columns) for number in range(count)):
+        corner = (column * cell[0] + left) / wide, ((rows - 1 - row) * cell[1] + below) / high
+        axes.append(figure.add_axes((*corner, *size)))
     head(figure, title)
     return Sheet(figure, tuple(axes))
 

@@ -81,14 +81,9 @@ class Scenery:
     @property
     def drawing(self) -> Drawing:
         """The parts in their colours."""
+        opacity = {} if self.opaque else OPACITY
         parts = (
-            Polygons(
-                part.points,
-                part.faces,
-                colour(name),
-                1.0 if self.opaque else OPACITY.get(name, 1.0),
-                feature_edges=True,
-            )
+            Polygons(part.points, part.faces, colour(name), opacity.get(name, 1.0), feature_edges=True)
             for name, part in self.parts.items()
         )
         return Drawing(self.camera, tuple(parts))
@@ -175,14 +170,7 @@ def _label(axes: Axes, view: Scenery, name: str) -> None:
     at = seen[np.argmin(seen[:, 1] if low else seen[:, 0]) if left or low else np.argmax(seen[:, 0])]
     shift = (-14, -4) if left else (30, -40) if low else (14, -4)
     line = {"arrowstyle": "-", "color": "#777777", "lw": 0.8}
-    axes.annotate(
-        f"{LABELS.get(name, name.replace('_', ' '))}\n{view.labels[name]}".strip(),
-        (float(at[0]), float(at[1])),
-        shift,
-        textcoords="offset points",
-        fontsize=8.5,
-        va="center",
-        ha="right" if left else "left",
-        arrowprops=line,
-        annotation_clip=False,
-    )
+    text = f"{LABELS.get(name, name.replace('_', ' '))}\n{view.labels[name]}".strip()
+    beside: dict[str, Any] = {"textcoords": "offset points", "va": "center", "ha": "right" if left else "left"}
+    place = float(at[0]), float(at[1])
+    axes.annotate(text, place, shift, fontsize=8.5, arrowprops=line, annotation_clip=False, **beside)

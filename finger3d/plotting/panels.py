@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -73,15 +73,8 @@ def keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
     figure.colorbar(ScalarMappable(Normalize(0.0, highest), CMAP), cax=bar, orientation="horizontal")
     bar.set_xlabel("contact pressure (MPa)")
     handles = patches(COLOURS, (STICK, SLIP, OPEN)) + [Line2D([], [], color=c, label=n) for n, c in lines.items()]
-    figure.legend(
-        handles=handles,
-        loc="center",
-        bbox_to_anchor=(0.75, 0.6 * inch),
-        ncols=len(handles),
-        frameon=False,
-        fontsize=11,
-        columnspacing=1.4,
-    )
+    place: dict[str, Any] = {"loc": "center", "bbox_to_anchor": (0.75, 0.6 * inch), "ncols": len(handles)}
+    figure.legend(handles=handles, frameon=False, fontsize=11, columnspacing=1.4, **place)
 
 
 def sliced(triangles: Float) -> Float:

@@ -164,7 +164,7 @@ class Polygons:
         import pyvista as pv
 
         corners, cells = unshared(self.points[self.cells])
-        mesh = pv.PolyData(corners, _padded(cells))
+        mesh = pv.PolyData(corners, of_vtk(cells))
         whole = mesh.clean(tolerance=1e-6, absolute=True)
         smooth = whole.compute_normals(False, consistent_normals=False, split_vertices=True, feature_angle=_SHARP_ANGLE)
         is_smooth = self.opacity == 1.0 and smooth.n_cells == mesh.n_cells  # not where a cell has no area
@@ -212,9 +212,8 @@ class Polylines:
         import pyvista as pv
 
         points, cells = unshared(self.points)
-        plotter.add_mesh(
-            pv.PolyData(points, lines=_padded(cells)), color=self.colour, line_width=self.width, opacity=self.opacity
-        )
+        lines = pv.PolyData(points, lines=of_vtk(cells))
+        plotter.add_mesh(lines, color=self.colour, line_width=self.width, opacity=self.opacity)
 
     def paint(self, axes: Axes, camera: Camera) -> None:
         """Draw the lines behind all polygons."""
@@ -238,9 +237,8 @@ class Arrows:
         shape = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_length=0.4, tip_radius=0.13, shaft_radius=0.045)
         points = pv.PolyData(self.centres)
         points["vector"] = self.vectors
-        plotter.add_mesh(
-            points.glyph(orient="vector", scale="vector", factor=1.0, geom=shape), color=self.colour, lighting=False
-        )
+        arrows = points.glyph(orient="vector", scale="vector", factor=1.0, geom=shape)
+        plotter.add_mesh(arrows, color=self.colour, lighting=False)
 
     def paint(self, axes: Axes, camera: Camera) -> None:
         """Draw the arrows before all polygons."""
@@ -262,6 +260,11 @@ def unshared(corners: Float) -> tuple[Float, Int]:
     """Return points (m k, 3) and cells (m, k) of polygons or lines (m, k, 3) that share no points."""
     count = corners.shape[0] * corners.shape[1]
     return np.ascontiguousarray(corners.reshape(-1, 3)), np.arange(count).reshape(corners.shape[:2])
+
+
+def of_vtk(cells: Int) -> Int:
+    """Return cells (m, k) in VTK's format: each preceded by its number of corners."""
+    return np.insert(cells, 0, cells.shape[1], axis=1).ravel()
 
 
 FAILURES: list[str] = []
@@ -380,11 +383,6 @@ def _painted(drawing: Drawing) -> Image:
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
-
-
-def _padded(cells: Int) -> Int:
-    """Return cells (m, k) in VTK's format: each preceded by its number of corners."""
-    return np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
 
 
 def _main(source: str, target: str) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from finger3d.plotting.deformed import coloured_halves
 from finger3d.plotting.gauges import COLOUR, marks_of
 from finger3d.plotting.panels import palette
-from finger3d.plotting.renderer import unshared
+from finger3d.plotting.renderer import of_vtk, unshared
 from finger3d.plotting.show import finger_of, found, mesh_of
 from finger3d.plotting.solid import BODY, OBJECT_OPACITY, OBJECT_TINT, skin_of
 from finger3d.results.states import States, captions, grid
@@ -76,23 +76,15 @@ class Window:
         self.lines = [pv.lines_from_points(self.rest[:3]) for _ in self.marks]
         for line in self.lines:
             self.plotter.add_mesh(line, color=COLOUR, line_width=5, lighting=False)
+        count, place = len(self.states.step), {"pointa": (0.62, 0.92), "pointb": (0.95, 0.92)}
+        slider = {"title": "kept increment", "fmt": "%.0f", "style": "modern", "color": "black"}
         self.plotter.add_slider_widget(
-            self.to_step,
-            rng=[1, max(len(self.states.step), 2)],
-            value=len(self.states.step),
-            title="kept increment",
-            fmt="%.0f",
-            style="modern",
-            pointa=(0.62, 0.92),
-            pointb=(0.95, 0.92),
-            color="black",
-            interaction_event="always",
+            self.to_step, rng=[1, max(count, 2)], value=count, interaction_event="always", **place, **slider
         )
         for key, name in zip("12345", FIELDS, strict=True):
             self.plotter.add_key_event(key, lambda name=name: self.to_field(name))
-        self.plotter.view_vector(
-            (-0.45, 1.05, 1.0) if self.states.dim == 3 else (0.0, 0.0, 1.0), viewup=(0.0, 1.0, 0.0)
-        )
+        towards = (-0.45, 1.05, 1.0) if self.states.dim == 3 else (0.0, 0.0, 1.0)
+        self.plotter.view_vector(towards, viewup=(0.0, 1.0, 0.0))
         self.plotter.reset_camera(bounds=self.shown.bounds)  # the object may be far larger
         self.plotter.add_axes(color="black")
         self.update()
@@ -129,18 +121,13 @@ class Window:
             skin = skin_of(finger_of(self.states, self.step, mesh))
             parts, status = skin.contact, skin.status
         points, cells = unshared(parts)
-        return (
-            points,
-            np.insert(cells, 0, cells.shape[1], axis=1).ravel(),
-            np.round(255 * palette()[status]).astype(np.uint8),
-        )
+        return points, of_vtk(cells), np.round(255 * palette()[status]).astype(np.uint8)
 
     def _object(self) -> tuple[Array, NDArray[np.integer]]:
         """Return points (v, 3) and triangles of the object at the current step, the latter in VTK's format."""
         states = self.states
         points = states.object_points @ states.object_rotation[self.step].T + states.object_place[self.step]
-        faces = states.object_faces
-        return points, np.hstack([np.full((len(faces), 1), 3, dtype=faces.dtype), faces]).ravel()
+        return points, of_vtk(states.object_faces)
 
     def _front(self) -> tuple[float, float, float]:
         """Return the initial origin of the clip plane, mm, in front of the finger, where it removes nothing."""
@@ -183,19 +170,10 @@ class Window:
         for line, mark in zip(self.lines, self.marks, strict=True):
             line.points = padded(mark.of(self.states.points + u))
         if self.marks:
-            self.plotter.add_point_labels(
-                np.array([line.points[1] for line in self.lines]),
-                [mark.label for mark in self.marks],
-                name="gauges",
-                text_color=COLOUR,
-                font_size=14,
-                bold=False,
-                shape_color="white",
-                shape_opacity=0.8,
-                show_points=False,
-                always_visible=True,
-                reset_camera=False,
-            )
+            middles, names = np.array([line.points[1] for line in self.lines]), [mark.label for mark in self.marks]
+            look = {"text_color": COLOUR, "font_size": 14, "bold": False, "shape_color": "white", "shape_opacity": 0.8}
+            seen = {"show_points": False, "always_visible": True, "reset_camera": False}
+            self.plotter.add_point_labels(middles, names, name="gauges", **look, **seen)
 
 
 def padded(u: Array) -> Array:

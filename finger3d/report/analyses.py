@@ -49,14 +49,11 @@ def calibrate_page(folder: str | Path) -> Page:
             for name, r in readings.items()
         ],
     )
-    curve = Table(
-        ("mu", *readings, "standard deviation of mu", "an estimate there is"),
-        list(zip(mu, *(r["curve"] for r in readings.values()), shown, status, strict=True)),
-    )
-    causes = Table(
-        ("uncertain quantity", f"fall of the variance of mu at {mu[best]:.3g} if it were known exactly"),
-        [(name, f"{100.0 * share[best]:.1f} %") for name, share in data["variance_reductions"].items()],
-    )
+    curves = zip(mu, *(r["curve"] for r in readings.values()), shown, status, strict=True)
+    curve = Table(("mu", *readings, "standard deviation of mu", "an estimate there is"), list(curves))
+    falls = [(name, f"{100.0 * share[best]:.1f} %") for name, share in data["variance_reductions"].items()]
+    fall = f"fall of the variance of mu at {mu[best]:.3g} if it were known exactly"
+    causes = Table(("uncertain quantity", fall), falls)
     given = " ".join(f"--strain {name}={r['curve'][best]:.5g}" for name, r in readings.items())
     failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
     note = data["about"].get("mesh", {}).get("note")
@@ -97,17 +94,10 @@ def compare_page(folder: str | Path) -> Page:
         if c["width_mm"] == own
     ]
     keys = list(dict.fromkeys(k for c in cases for k in c["numbers"]))
-    rows = [
-        (
-            c["model"],
-            c["width_mm"],
-            c["size_mm"],
-            *(number(c["numbers"][k], c["errors"].get(k)) if k in c["numbers"] else "" for k in keys),
-            c["seconds"],
-            c["outcome"],
-        )
-        for c in data["cases"]
-    ]
+    rows = []
+    for c in data["cases"]:
+        told = (number(c["numbers"][k], c["errors"].get(k)) if k in c["numbers"] else "" for k in keys)
+        rows.append((c["model"], c["width_mm"], c["size_mm"], *told, c["seconds"], c["outcome"]))
     head = ("model", "width (mm)", "edges (mm)", *keys, "seconds", "outcome")
     proof = (
         "Each case is a separate press. It has numbers only if every increment satisfies Eqs. (1)-(4) of Maeno 2004, "
@@ -167,21 +157,13 @@ def identify_page(folder: str | Path) -> Page:
         ("key", "from", "to", "value", "standard deviation", "68 % interval"),
         [(key, *bounds[key], v["value"], v["std"], f"{v['low']:.4g} to {v['high']:.4g}") for key, v in values.items()],
     )
-    correlation = Table(
-        ("correlation", *values),
-        [(key, *(f"{r:.3f}" for r in row.values())) for key, row in data["correlation"].items()],
-    )
-    columns = Table(
-        ("measured column", "residual, rms", "standard deviation, rms", "from"),
-        [
-            (n, rms, data["std_of_columns"][n]["rms"], data["std_of_columns"][n]["from"])
-            for n, rms in data["residual_rms"].items()
-        ],
-    )
-    stability = Table(
-        ("mode", "stable to a stretch of", "measured to"),
-        [(mode, to, stable["measured_to"][mode]) for mode, to in stable["rises_to"].items()] if stable else [],
-    )
+    correlated = [(key, *(f"{r:.3f}" for r in row.values())) for key, row in data["correlation"].items()]
+    correlation = Table(("correlation", *values), correlated)
+    stds = data["std_of_columns"]
+    fitted = [(n, rms, stds[n]["rms"], stds[n]["from"]) for n, rms in data["residual_rms"].items()]
+    columns = Table(("measured column", "residual, rms", "standard deviation, rms", "from"), fitted)
+    ends = [(mode, to, stable["measured_to"][mode]) for mode, to in stable["rises_to"].items()] if stable else []
+    stability = Table(("mode", "stable to a stretch of", "measured to"), ends)
     sources = [path for path in (data["measured"], *data.get("material_tests", ())) if path]
     told = f"Standard deviations are {data['deviations']}."
     scene = folder / "identified.toml"
@@ -242,19 +224,14 @@ def optimise_page(folder: str | Path) -> Page:
     without = len(rows) - len(good)
     failures = [f"{without} of {len(rows)} designs have no number; evaluations.csv has the reasons."] if without else []
     best_scene = folder / "best.toml"
+    command = Code(f"finger3d press {best_scene} --out {folder / 'pressed'}")
     return Page(
         f"{title_of(search['scene'])}: design for sensitivity",
         headline,
         [
             PageSection("Free keys", [_SENSITIVITY, Table(("key", "from", "to", "start", "best", ""), free)]),
             PageSection("The best designs", [*failures, Table((*bounds, "objective"), best)]),
-            PageSection(
-                "Use it",
-                [
-                    Code(f"finger3d press {best_scene} --out {folder / 'pressed'}"),
-                    Code(best_scene.read_text(encoding="utf-8"), "best.toml"),
-                ],
-            ),
+            PageSection("Use it", [command, Code(best_scene.read_text(encoding="utf-8"), "best.toml")]),
         ],
         [Figure("design.png", "Convergence of the search, and the objective against each free key")],
         command="optimise",
@@ -285,19 +262,13 @@ def gauge_places_page(folder: str | Path) -> Page:
     headline = [
         HeadlineRow(f"mu \u00b1, mean over mu = {data['mu'][0]:g} to {data['mu'][-1]:g}", f"{data['mean_mu_sd']:.3g}"),
         HeadlineRow("readings tell mu", f"up to {told[-1]:.2g}" if told else "nowhere"),
-        *(
-            HeadlineRow(
-                f"{g['name']}",
-                f"x {g['x_mm']:.1f}, y {g['y_mm']:.1f}, z {g['z_mm']:.1f} mm, {g['angle_deg']:.1f}\u00b0",
-            )
-            for g in gauges
-        ),
     ]
+    for g in gauges:
+        place = f"x {g['x_mm']:.1f}, y {g['y_mm']:.1f}, z {g['z_mm']:.1f} mm, {g['angle_deg']:.1f}\u00b0"
+        headline.append(HeadlineRow(g["name"], place))
     keys = "name", "x_mm", "y_mm", "z_mm", "angle_deg", "mean_mu_sd_alone", "mean_mu_sd_with_those_before"
-    each = Table(
-        ("gauge", "x (mm)", "y (mm)", "z (mm)", "angle (degree)", "mean sd of mu alone", "with those before"),
-        [[g[key] for key in keys] for g in gauges],
-    )
+    head = "gauge", "x (mm)", "y (mm)", "z (mm)", "angle (degree)", "mean sd of mu alone", "with those before"
+    each = Table(head, [[g[key] for key in keys] for g in gauges])
     spread = Table(("mu", "sd of mu"), known)
     best = folder / "best.toml"
     return Page(
@@ -334,17 +305,12 @@ def sweep_page(folder: str | Path) -> Page:
     failed = [row for row in rows if row["outcome"] != "converged"]
     forces = [float(row["normal_force_N"]) for row in rows if row["outcome"] == "converged"]
     strains = strains_of(data["scene"])
-    headline = [
-        HeadlineRow("points", f"{len(rows)} of {data['points']}"),
-        HeadlineRow("bodies", str(len(data["bodies"]))),
-    ]
+    bodies = HeadlineRow("bodies", str(len(data["bodies"])))
+    headline = [HeadlineRow("points", f"{len(rows)} of {data['points']}"), bodies]
     if forces:
         headline.append(HeadlineRow("normal force", f"{min(forces):.4g} to {max(forces):.4g}", "N"))
-    more = (
-        [f"The first {_MOST_SWEEP_ROWS} of {len(rows)} points; all are in results.csv."]
-        if len(rows) > _MOST_SWEEP_ROWS
-        else []
-    )
+    cut = f"The first {_MOST_SWEEP_ROWS} of {len(rows)} points; all are in results.csv."
+    more = [cut] if len(rows) > _MOST_SWEEP_ROWS else []
     is_list = data.get("list", False)
     varied = [(key, _values(values, is_list)) for key, values in data["vary"].items()]
     return Page(

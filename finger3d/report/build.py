@@ -78,17 +78,10 @@ class Chart:
 
 def script(charts: Sequence[Chart]) -> str:
     """Return the scripts with the data of all charts of a page and the code that draws them."""
-    data = [
-        {
-            "caption": chart.caption,
-            "x": chart.x,
-            "y": chart.y,
-            "legend": chart.legend,
-            "joined": chart.joined,
-            "lines": [{"label": line.label, "x": _known(line.x), "y": _known(line.y)} for line in chart.lines],
-        }
-        for chart in charts
-    ]
+    data = []
+    for chart in charts:
+        lines = [{"label": line.label, "x": _known(line.x), "y": _known(line.y)} for line in chart.lines]
+        data.append({**vars(chart), "lines": lines})
     numbers = f'<script type="application/json" id="chart-data">{embedded(data)}</script>\n'
     return f"{numbers}<script>{asset('chart.js')}</script>\n"
 

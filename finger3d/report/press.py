@@ -169,13 +169,10 @@ def press_page(folder: str | Path) -> Page:
     source = folder / "steps.npz"
     states = load_states(source) if source.exists() else None
     last = f" after increment {steps.index(good[-1]) + 1}, {good[-1].depth_mm:.4g} mm deep" if good else ""
+    grip = PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])
     sections = [
         PageSection("Scene", how_modelled(summary, folder)),
-        *(
-            [PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])]
-            if "fingers" in summary
-            else []
-        ),
+        *([grip] if "fingers" in summary else []),
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
         *_changes(summary),
@@ -250,18 +247,11 @@ def _proof(steps: Sequence[PressStep], states: States | None, good: Sequence[Pre
         parts.append(f"Largest residual of the {len(good)} converged increments: {worst:.1e}.")
     if states is not None:
         parts.append(_last_state(states))
-    rows = [
-        (
-            k,
-            step.depth_mm,
-            f"{step.residual:.1e}" if step.residual is not None else "none",
-            "yes" if step.residual is not None and step.residual <= TOLERANCE else "NO",
-            step.iterations,
-            step.method,
-            step.outcome,
-        )
-        for k, step in enumerate(steps, start=1)
-    ]
+    rows = []
+    for k, step in enumerate(steps, start=1):
+        residual = "none" if step.residual is None else f"{step.residual:.1e}"
+        holds = "yes" if step.residual is not None and step.residual <= TOLERANCE else "NO"
+        rows.append((k, step.depth_mm, residual, holds, step.iterations, step.method, step.outcome))
     head = ("increment", "depth (mm)", "residual", f"≤ {TOLERANCE:g}", "iterations", "method", "outcome")
     return PageSection("Proof of the contact conditions", [*parts, Table(head, rows)])
 
@@ -295,22 +285,19 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
     rows = [[*(getattr(s, one.name) for one in shown), *(s.readings.get(c) for c in columns)] for s in good]
     names = [f"{MEASURED[c.kind]} {c.sensor}{c.unit and f' ({c.unit})'}" for c in columns]
     table = Table([*(spelt(one.label) for one in shown), *names], rows)
-    return PageSection(
-        "Every increment", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True
-    )
+    told = "The file history.csv has these numbers, and more, with all digits."
+    return PageSection("Every increment", [told, table], folded=True)
 
 
 def _mesh(mesh: TreeView) -> Table:
+    part = f"the part that is symmetric in {' and '.join(mesh['symmetry'])}" if mesh["symmetry"] else "the whole"
     rows: list[tuple[str, object]] = [
         ("finger", mesh.get("finger", "unknown")),
         ("nodes, cells", f"{mesh['points']}, {mesh['cells']}"),
         ("unknowns", str(mesh["dofs"])),
         ("contact points", str(mesh["contact_points"])),
         ("elements", mesh["formulation"]),
-        (
-            "solved on",
-            f"the part that is symmetric in {' and '.join(mesh['symmetry'])}" if mesh["symmetry"] else "the whole",
-        ),
+        ("solved on", part),
         ("smallest dihedral angle", f"{_digits(mesh['min_dihedral_deg'])} deg"),
         ("volume of mesh, of CAD", f"{mesh['volume_mm3']:.6g}, {_digits(mesh['cad_volume_mm3'])} mm³"),
         ("hash", f"{mesh['hash']}{', from the cache' if mesh['from_cache'] else ''}"),

@@ -16,7 +16,7 @@ from finger3d.geometry.design import Design, designs
 from finger3d.geometry.files import SUFFIXES
 from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene import files
-from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
+from finger3d.scene.messages import Place, choose, described, dotted, listed, message, messages_from, nearest, unknown
 from finger3d.scene.tables import (
     AutoTable,
     GripTable,
@@ -93,35 +93,31 @@ def named(
         return "", None  # found by the check of the whole file
     if key not in given_table:
         misspelt = next((k for k in given_table if nearest(k, (key,))), None)
-        line = (
-            unknown((name, misspelt), given_table[misspelt], (key,))
-            if misspelt
-            else f"{name}.{key} is missing: must be {listed(types)}"
-        )
-        mistakes[name, misspelt or key] = line
+        if misspelt:
+            mistakes[name, misspelt] = unknown((name, misspelt), given_table[misspelt], (key,))
+        else:
+            mistakes[name, key] = f"{name}.{key} is missing: must be {listed(types)}"
         return "", None
-    value, rest = given_table[key], {k: v for k, v in given_table.items() if k != key}
+    place, value, rest = (name, key), given_table[key], {k: v for k, v in given_table.items() if k != key}
     if isinstance(value, str) and not one_line(value):
-        mistakes[name, key] = f"{name}.{key} = {shown(value)}: must be {described(PathName)}"
+        mistakes[place] = message(place, value, f"must be {described(PathName)}")
         return "", None
     if name == "finger" and files.is_file(value):
         if not Path(value).exists():
             # Reported alone: the other keys may be those of the design that the file replaces.
-            mistakes[name, key] = (
-                f"{name}.{key}: {value}: there is no such file; give its path from the scene's folder, or a design: "
-                f"{listed(types)}"
-            )
+            advice = f"give its path from the scene's folder, or a design: {listed(types)}"
+            mistakes[place] = f"{name}.{key}: {value}: there is no such file; {advice}"
             return "", None
         extra: dict[Place, str] = {}
         table = checked(files.table_of_file(value), rest, (name,), extra, also=(key,))
         mistakes |= {p: t.replace("no such key", "no such key beside this file, take it out") for p, t in extra.items()}
         return value, table
     if name == "finger" and isinstance(value, str) and "." in value:
-        mistakes[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(files.FINGER_SUFFIXES)}"
+        mistakes[place] = message(place, value, f"a file must be named {listed(files.FINGER_SUFFIXES)}")
     elif name == "object" and isinstance(value, str) and value.lower().endswith(SUFFIXES):
-        mistakes[name, key] = f'{name}.{key} = {shown(value)}: must be "mesh", and the file its path'
+        mistakes[place] = message(place, value, 'must be "mesh", and the file its path')
     elif not isinstance(value, str) or value not in types:
-        mistakes[name, key] = choose((name, key), value, list(types))
+        mistakes[place] = choose(place, value, list(types))
     else:
         return value, checked(table_of(types[value]), rest, (name,), mistakes, also=(key,))
     return "", None
@@ -142,10 +138,8 @@ def press_of(document: TreeView, mistakes: dict[Place, str]) -> PressTable | Leg
     if "leg" not in press:
         return checked(PressTable, press, ("press",), mistakes, also=("leg",))
     if both := [k for k in press if k in LegTable.model_fields]:
-        mistakes["press", both[0]] = (
-            f"press.{both[0]} = {shown(press[both[0]])}: must not stand beside [[press.leg]]; "
-            "give either one press or its legs"
-        )
+        beside = "must not stand beside [[press.leg]]; give either one press or its legs"
+        mistakes["press", both[0]] = message(("press", both[0]), press[both[0]], beside)
         return None
     return checked(LegsTable, press, ("press",), mistakes)
 
@@ -172,9 +166,8 @@ def effects_of(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str
     keys = {name: value for name, value in present.items() if name in AutoTable.model_fields}
     auto = checked(AutoTable, keys, ("effects",), mistakes, also=effect_names())
     if auto and auto.auto_tolerance and auto.auto is False:
-        mistakes["effects", "auto_tolerance"] = (
-            f"effects.auto_tolerance = {shown(auto.auto_tolerance)}: nothing is judged with effects.auto = false"
-        )
+        place = ("effects", "auto_tolerance")
+        mistakes[place] = message(place, auto.auto_tolerance, "nothing is judged with effects.auto = false")
     for name, settings in present.items():
         if name in AutoTable.model_fields:
             continue
@@ -184,7 +177,7 @@ def effects_of(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str
         elif settings is False:
             continue
         elif not isinstance(settings, Mapping):
-            mistakes[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}], true or false"
+            mistakes[place] = message(place, settings, f"must be a table, [{dotted(place)}], true or false")
         elif table := checked(table_of(effect_type(name)), settings, place, mistakes):
             tables[name], effects[name] = table, built(effect_type(name), table, place, mistakes)
     return tables, effects, auto

@@ -24,7 +24,7 @@ from finger3d.mechanics.readings import (
 from finger3d.meshing.given import GivenMesh
 from finger3d.scene.material import check_parts
 from finger3d.scene.mesh_sizes import smallest_mm
-from finger3d.scene.messages import Place, dotted, shown
+from finger3d.scene.messages import Place, dotted, message, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
 _MOST_MARKERS = 20_000
@@ -164,18 +164,16 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
         elif i == 0 and leg.depth_mm == 0.0 and any(_target(leg)[2:]):
             lines.append(f"{dotted(place)}: moves before first touch; give the first leg a depth_mm above 0")
         elif leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
-            lines.append(f"{dotted((*place, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
+            lines.append(message((*place, "depth_mm"), leg.depth_mm, f"must be {allowed}"))
         for key in ("slide_x_mm", "slide_z_mm"):
             far = LONGEST_SLIDE * half_length
             if abs(value := getattr(leg, key)) > far:
-                lines.append(
-                    f"{dotted((*place, key))} = {shown(value)}: must be a number from -{at_most(far)} to "
-                    f"{at_most(far)}, {LONGEST_SLIDE:g} times the finger's half length"
-                )
+                most = f"{at_most(far)}, {LONGEST_SLIDE:g} times the finger's half length"
+                lines.append(message((*place, key), value, f"must be a number from -{at_most(far)} to {most}"))
         lines += _tangential(place, leg, legs[i - 1] if i else None, solid)
         for key in () if solid else ("slide_z_mm", "turn_x_deg", "turn_y_deg"):
             if (value := getattr(leg, key)) != 0.0:
-                lines.append(f"{dotted((*place, key))} = {shown(value)}: must be 0.0 in a 2D domain")
+                lines.append(message((*place, key), value, "must be 0.0 in a 2D domain"))
     return lines
 
 
@@ -194,11 +192,9 @@ def _tangential(place: Place, leg: LegTable, before: LegTable | None, solid: boo
         after_force = before is not None and getattr(before, force) is not None
         if value is None:
             if after_force and leg.depth_mm != 0.0 and coordinate not in leg.model_fields_set:
-                lines.append(
-                    f"{dotted((*place, force))} is missing: the leg before has {force} = "
-                    f"{shown(getattr(before, force))}; give it here, too, or {coordinate} to which the object then "
-                    "moves"
-                )
+                had = f"the leg before has {force} = {shown(getattr(before, force))}"
+                advice = f"give it here, too, or {coordinate} to which the object then moves"
+                lines.append(f"{dotted((*place, force))} is missing: {had}; {advice}")
         elif only_solid and not solid:
             lines.append(f"{what}: must be left out in a 2D domain")
         elif getattr(leg, coordinate):
@@ -221,29 +217,22 @@ def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:
         return [line]
     for key in ("size_mm", "base_size_mm"):
         if mesh.tolerance is not None and (size := getattr(mesh, key)) is not None:
-            return [
-                f"mesh.tolerance = {shown(mesh.tolerance)}: must not stand beside mesh.{key} = {shown(size)}; "
-                "give either sizes or a tolerance"
-            ]
+            beside = f"must not stand beside mesh.{key} = {shown(size)}; give either sizes or a tolerance"
+            return [message(("mesh", "tolerance"), mesh.tolerance, beside)]
     if mesh.max_seconds is not None and mesh.tolerance is None:
-        return [f"mesh.max_seconds = {shown(mesh.max_seconds)}: only with mesh.tolerance, whose refining it ends"]
+        only = "only with mesh.tolerance, whose refining it ends"
+        return [message(("mesh", "max_seconds"), mesh.max_seconds, only)]
     extent = smallest_mm(design, solid)
     section = smallest_mm(design, solid=False)
     if mesh.size_mm is not None and mesh.size_mm > extent:
-        return [
-            f"mesh.size_mm = {shown(mesh.size_mm)}: larger than the finger; must be at most {at_most(extent)}, "
-            "its smallest extent"
-        ]
+        large = f"larger than the finger; must be at most {at_most(extent)}, its smallest extent"
+        return [message(("mesh", "size_mm"), mesh.size_mm, large)]
     if mesh.base_size_mm is not None and mesh.base_size_mm > section:
-        return [
-            f"mesh.base_size_mm = {shown(mesh.base_size_mm)}: larger than the finger; must be at most "
-            f"{at_most(section)}, its smallest extent in the section"
-        ]
+        large = f"larger than the finger; must be at most {at_most(section)}, its smallest extent in the section"
+        return [message(("mesh", "base_size_mm"), mesh.base_size_mm, large)]
     if mesh.size_mm and mesh.base_size_mm and mesh.base_size_mm < mesh.size_mm:
-        return [
-            f"mesh.base_size_mm = {shown(mesh.base_size_mm)}: finer than the contact; "
-            f"must be at least mesh.size_mm = {shown(mesh.size_mm)}"
-        ]
+        fine = f"finer than the contact; must be at least mesh.size_mm = {shown(mesh.size_mm)}"
+        return [message(("mesh", "base_size_mm"), mesh.base_size_mm, fine)]
     return []
 
 
@@ -257,10 +246,8 @@ def _beside_a_mesh(mesh: MeshTable, design: GivenMesh) -> str:
     for key, edge in (("size_mm", design.size_mm), ("base_size_mm", design.base_size_mm)):
         value = getattr(mesh, key)
         if value is not None and value > edge * (1.0 + 1e-9):
-            return (
-                f"mesh.{key} = {shown(value)}: the mesh {design.name} has edges of {shown(edge)} mm and is not made "
-                f"coarser; must be at most {at_most(edge)}, or be taken out"
-            )
+            has = f"the mesh {design.name} has edges of {shown(edge)} mm and is not made coarser"
+            return message(("mesh", key), value, f"{has}; must be at most {at_most(edge)}, or be taken out")
     return ""
 
 
@@ -268,16 +255,12 @@ def _place(place: Place, it: GaugeTable | MarkerTable, along: Float, angle: floa
     """Check the place of a gauge or marker, and the ends of a gauge: distances `along` from its middle, mm."""
     half_length, height = design.half_length_mm, design.height_mm
     half_width, what = design.width_mm / 2.0, f"{place[0]} {shown(it.name)}"
-    for key, value, low, high in (
-        ("x_mm", it.x_mm, -half_length, half_length),
-        ("y_mm", it.y_mm, 0.0, height),
-        ("z_mm", it.z_mm, -half_width, half_width),
-    ):
-        if not low <= value <= high:
-            return [
-                f"{dotted((*place, key))} = {shown(value)}: {what} is outside the finger; "
-                f"must be a number from {at_least(low)} to {at_most(high)}"
-            ]
+    outside = f"{what} is outside the finger"
+    ends = {"x_mm": (-half_length, half_length), "y_mm": (0.0, height), "z_mm": (-half_width, half_width)}
+    for key, (low, high) in ends.items():
+        if not low <= (value := getattr(it, key)) <= high:
+            allowed = f"must be a number from {at_least(low)} to {at_most(high)}"
+            return [message((*place, key), value, f"{outside}; {allowed}")]
     x, y = it.x_mm + along * math.cos(angle), it.y_mm + along * math.sin(angle)
     top = design.top(x, np.full_like(x, it.z_mm))
     slack = 1e-9 * height
@@ -285,19 +268,13 @@ def _place(place: Place, it: GaugeTable | MarkerTable, along: Float, angle: floa
         return []
     here = float(design.top(np.array([it.x_mm]), np.array([it.z_mm]))[0])
     if math.isnan(here):
-        return [
-            f"{dotted((*place, 'z_mm'))} = {shown(it.z_mm)}: {what} is outside the finger; "
-            f"must be nearer to 0 at x_mm = {shown(it.x_mm)}"
-        ]
+        nearer = f"must be nearer to 0 at x_mm = {shown(it.x_mm)}"
+        return [message((*place, "z_mm"), it.z_mm, f"{outside}; {nearer}")]
     if isinstance(it, GaugeTable) and it.length_mm and it.y_mm <= here + slack:
-        return [
-            f"{dotted((*place, 'length_mm'))} = {shown(it.length_mm)}: an end of {what} "
-            "leaves the finger; must be shorter, or the gauge moved inward"
-        ]
-    return [
-        f"{dotted((*place, 'y_mm'))} = {shown(it.y_mm)}: {what} is outside the finger; "
-        f"must be a number from 0 to {at_most(here)} at x_mm = {shown(it.x_mm)}"
-    ]
+        leaves = f"an end of {what} leaves the finger; must be shorter, or the gauge moved inward"
+        return [message((*place, "length_mm"), it.length_mm, leaves)]
+    allowed = f"must be a number from 0 to {at_most(here)} at x_mm = {shown(it.x_mm)}"
+    return [message((*place, "y_mm"), it.y_mm, f"{outside}; {allowed}")]
 
 
 def _grid(key: str, spacing_mm: float, design: Design, solid: bool) -> list[str]:
@@ -315,19 +292,16 @@ def _taxel(index: int, taxel: TaxelTable, design: Design, solid: bool) -> list[s
     width = (taxel.width_mm or 0.0) if solid else 0.0
     if solid and not width:
         return [f"{dotted(('taxel', index, 'width_mm'))} is missing: a number from 1e-6 to 1e6 is required of a solid"]
+    leaves = f"taxel {shown(taxel.name)} leaves the base"
     halves = {"x_mm": (taxel.length_mm, design.half_length_mm), "z_mm": (width, design.width_mm / 2.0)}
     for key, (extent, half) in halves.items():
         most, value = half - 0.5 * extent, getattr(taxel, key)
         if abs(value) > most * (1.0 + 1e-9) and (solid or key == "x_mm"):
-            return [
-                f"{dotted(('taxel', index, key))} = {shown(value)}: taxel {shown(taxel.name)} leaves the base; "
-                + (f"must be from -{at_most(most)} to {at_most(most)}" if most > 0.0 else "must be smaller")
-            ]
+            allowed = f"must be from -{at_most(most)} to {at_most(most)}" if most > 0.0 else "must be smaller"
+            return [message(("taxel", index, key), value, f"{leaves}; {allowed}")]
     corners = 0.5 * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]) * [taxel.length_mm, width]
     x, z = (1.0 - 1e-9) * (corners + [taxel.x_mm, taxel.z_mm]).T
     if np.isnan(design.top(x, z if solid else np.zeros_like(z))).any():
-        return [
-            f"{dotted(('taxel', index, 'x_mm'))} = {shown(taxel.x_mm)}: taxel {shown(taxel.name)} leaves the base; "
-            "must be smaller, or nearer to the middle"
-        ]
+        nearer = f"{leaves}; must be smaller, or nearer to the middle"
+        return [message(("taxel", index, "x_mm"), taxel.x_mm, nearer)]
     return []

@@ -17,7 +17,7 @@ from finger3d.materials.modulus import MODULUS_KEYS, NU, ElasticConstants
 from finger3d.materials.silicones import silicone_named
 from finger3d.mechanics.model import Leg, contact_path
 from finger3d.objects import PlacedObject, RigidObject
-from finger3d.scene.messages import Place, dotted, shown, unknown
+from finger3d.scene.messages import Place, dotted, message, unknown
 from finger3d.scene.tables import ElasticTable, PartTable, SceneTable
 
 Elastic = TypeVar("Elastic", bound=ElasticTable)
@@ -38,8 +38,8 @@ def mistakes(table: ElasticTable, place: Place) -> dict[Place, str]:
         return {missing: f"{dotted(missing)} is missing: a number from 1e-9 to 1e9 is required, or one of {_CHOICE}"}
     if len(keys) > 1:
         second = (*place, keys[1])
-        value = shown(getattr(table, keys[1]))
-        return {second: f"{dotted(second)} = {value}: must not stand beside {keys[0]}; give one of {_CHOICE}"}
+        beside = f"must not stand beside {keys[0]}; give one of {_CHOICE}"
+        return {second: message(second, getattr(table, keys[1]), beside)}
     if table.E_MPa is not None and table.nu is None:
         missing = (*place, "nu")
         return {missing: f"{dotted(missing)} is missing: a number from 0 to 0.5 is required beside E_MPa"}
@@ -48,7 +48,7 @@ def mistakes(table: ElasticTable, place: Place) -> dict[Place, str]:
             silicone_named(table.silicone)
         except Finger3dError as error:
             named = (*place, "silicone")
-            return {named: f"{dotted(named)} = {shown(table.silicone)}: {error}"}
+            return {named: message(named, table.silicone, str(error))}
     return {}
 
 
@@ -185,7 +185,7 @@ def check_parts(tables: SceneTable, design: Design) -> list[str]:
             lines.append(unknown(place, {}, design.part_labels, kind=f"part of {design.name}"))
         elif part.rigid and constants:
             key, value = next(iter(constants.items()))
-            lines.append(f"{dotted((*place, key))} = {shown(value)}: not with rigid = true; take one of the two out")
+            lines.append(message((*place, key), value, "not with rigid = true; take one of the two out"))
         elif not part.rigid:
             lines += [f"{line}; or rigid = true" for line in mistakes(part, place).values()]
     return lines

@@ -44,6 +44,11 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def message(place: Place, value: object, said: str) -> str:
+    """Return a key with its value, and what is said about it."""
+    return f"{dotted(place)} = {shown(value)}: {said}"
+
+
 def listed(names: Iterable[str]) -> str:
     """``"a", "b" or "c"``."""
     quoted = [json.dumps(n, ensure_ascii=False) for n in names]
@@ -64,7 +69,7 @@ def choose(place: Place, value: object, names: Sequence[str]) -> str:
     """Return the message about a value that is not one of `names`."""
     near = nearest(value, names) if isinstance(value, str) else None
     hint = f'did you mean "{near}"? ' if near else ""
-    return f"{dotted(place)} = {shown(value)}: {hint}must be {listed(names)}"
+    return message(place, value, f"{hint}must be {listed(names)}")
 
 
 def unknown(place: Place, value: object, names: Sequence[str], kind: str = "key") -> str:
@@ -201,7 +206,7 @@ def messages_from(
             value = _value(tree, place)
             finite = isinstance(value, float) and not math.isfinite(value)
             allowed = described(hint).replace("a number", "a finite number", 1) if finite else described(hint)
-            lines[full] = f"{dotted(full)} = {shown(value)}: must be {allowed}"
+            lines[full] = message(full, value, f"must be {allowed}")
     # A list that shrank because of the mistakes in it is not itself a mistake.
     return {p: line for p, line in lines.items() if not any(q != p and q[: len(p)] == p for q in lines)}
 

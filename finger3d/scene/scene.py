@@ -146,10 +146,8 @@ class Scene:
             If it is still open which of them are on.
         """
         if self.auto:
-            raise Finger3dError(
-                "effects.auto = true: a press finds which effects this scene calls for; take the scene.toml that "
-                "finger3d press writes"
-            )
+            advice = "take the scene.toml that finger3d press writes"
+            raise Finger3dError(f"effects.auto = true: a press finds which effects this scene calls for; {advice}")
         return self._model
 
     @cached_property

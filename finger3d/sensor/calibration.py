@@ -16,7 +16,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.io import checksum, write_csv, write_json
+from finger3d.io import checksum, file_bytes, write_csv, write_json
 from finger3d.sensor.curve import FEWEST, QUANTITIES, ReadingCurve, SensorModel, Tolerance
 from finger3d.sensor.likelihood import Estimate, estimator, ranges_text
 
@@ -45,10 +45,9 @@ class Calibration(SensorModel):
     def __post_init__(self) -> None:
         """Raise an error if there are too few points."""
         if len(self.mu) < FEWEST:
-            raise MissingError(
-                f"calibrate: only {len(self.mu)} of {len(self.mu) + len(self.failed)} values of mu converged, {FEWEST} "
-                f"are needed; first failure: {self.failed[0][1] if self.failed else 'none'}"
-            )
+            found = f"only {len(self.mu)} of {len(self.mu) + len(self.failed)} values of mu converged"
+            first = self.failed[0][1] if self.failed else "none"
+            raise MissingError(f"calibrate: {found}, {FEWEST} are needed; first failure: {first}")
 
     @property
     def title(self) -> str:
@@ -70,10 +69,8 @@ class Calibration(SensorModel):
         """Return an estimate for each set of readings (m, k); `noise` (m, k) has their standard deviations."""
         stds = np.broadcast_to(self.noise if noise is None else noise, readings.shape)
         model = self if tolerances else self.without_tolerances
-        return [
-            estimator(model, self.limit, tuple(std.tolist())).estimate(reading)
-            for reading, std in zip(readings, stds, strict=True)
-        ]
+        estimators = (estimator(model, self.limit, tuple(std.tolist())) for std in stds)
+        return [one.estimate(reading) for one, reading in zip(estimators, readings, strict=True)]
 
     @cached_property
     def without_tolerances(self) -> Calibration:
@@ -268,12 +265,9 @@ def load(path: str | Path) -> Calibration:
         In one line: no such file, no JSON (cut short), no calibration, another version, or changed since.
     """
     again = "calibrate again: finger3d calibrate SCENE --gauge NAME --out DIR"
+    content = file_bytes(path, "; finger3d calibrate writes calibration.json")
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise Finger3dError(f"{path}: there is no such file; finger3d calibrate writes calibration.json") from None
-    except OSError as error:
-        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
+        data = json.loads(content.decode("utf-8"))
     except (ValueError, RecursionError):
         raise Finger3dError(f"{path}: not JSON, or cut short; {again}") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:

@@ -346,12 +346,9 @@ class SensorModel:
         It is the reduction of the variance of the linear model if that quantity were known exactly.  Shares of several
         readings need not sum to 1.
         """
-        whole = self.mu_sd(mu) ** 2
+        whole, names = self.mu_sd(mu) ** 2, ("noise", *self.tolerance_names)
         with np.errstate(invalid="ignore"):
-            return {
-                name: np.nan_to_num(1.0 - self.mu_sd(mu, without=name) ** 2 / whole)
-                for name in ("noise", *self.tolerance_names)
-            }
+            return {name: np.nan_to_num(1.0 - self.mu_sd(mu, without=name) ** 2 / whole) for name in names}
 
 
 def _squares(effects: Float) -> Float:

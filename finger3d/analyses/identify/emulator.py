@@ -128,10 +128,8 @@ class Emulator:
         """Return at which shares (s, k) the nearest press failed."""
         if not self._failures:
             return np.zeros(len(shares), dtype=bool)
-        at = shares[:, None, self.pressed]
-        bad, good = (
-            np.linalg.norm(at - np.array([*some]), axis=2).min(axis=1) for some in (self._failures, self._presses)
-        )
+        at, both = shares[:, None, self.pressed], (self._failures, self._presses)
+        bad, good = (np.linalg.norm(at - np.array([*some]), axis=2).min(axis=1) for some in both)
         return np.asarray(bad < good)
 
     @cached_property

@@ -75,10 +75,9 @@ def read_material_tests(path: Path) -> list[MaterialTest]:
             raise Finger3dError(f"{path}: line {line}: {choose((_MODE,), mode, list(TESTS))}")
         low, high = (1.0 / LARGEST_STRETCH, 1.0) if mode == "compression" else (1.0, LARGEST_STRETCH)
         if not low <= stretch <= high:
-            raise Finger3dError(
-                f"{path}: line {line}: stretch = {stretch:g}: must be from {low:g} to {high:g} in {mode}; "
-                "a stretch is the length over that at rest, 1 plus the strain"
-            )
+            allowed = f"must be from {low:g} to {high:g} in {mode}"
+            meant = "a stretch is the length over that at rest, 1 plus the strain"
+            raise Finger3dError(f"{path}: line {line}: stretch = {stretch:g}: {allowed}; {meant}")
     if _STRESS + STD in numbers:
         check_stds(path, table.lines, _STRESS, numbers[_STRESS + STD])
     return [_of_mode(path, table, mode, modes == mode, numbers) for mode in TESTS if mode in modes]
@@ -90,9 +89,8 @@ def _of_mode(path: Path, table: CsvTable, mode: str, rows: Any, numbers: Mapping
     if test.stress @ (test.stretch - 1.0) <= 0.0:
         sign = "negative" if mode == "compression" else "positive"
         line = table.lines[int(np.argmax(rows))]
-        raise Finger3dError(
-            f"{path}: line {line} and others: the stress in {mode} must be {sign}, at a stretch beside 1"
-        )
+        must = f"the stress in {mode} must be {sign}, at a stretch beside 1"
+        raise Finger3dError(f"{path}: line {line} and others: {must}")
     return test
 
 
@@ -123,9 +121,8 @@ class LawInTests:
             If the scene has no law.
         """
         if tests and LARGE_DEFORMATION not in scene.effects:
-            raise Finger3dError(
-                f"{tests[0].path}: a material test needs a law; give --set {_PREFIX}law=neo-hookean, or another"
-            )
+            advice = f"give --set {_PREFIX}law=neo-hookean, or another"
+            raise Finger3dError(f"{tests[0].path}: a material test needs a law; {advice}")
         named: dict[str, MaterialTest] = {}
         for test in tests:
             count = sum(one.mode == test.mode for one in named.values())
@@ -166,9 +163,8 @@ class LawInTests:
                 terms[int(place[0])][int(place[1])] = value
             elif key.startswith(CONSTANT_KEYS):
                 constants[name] = value
-        return (
-            replace(effect, **constants).isochoric_law().with_shear(modulus / 3.0)
-        )  # E = 3 G of an incompressible solid
+        # E = 3 G of an incompressible solid
+        return replace(effect, **constants).isochoric_law().with_shear(modulus / 3.0)
 
     def stress(self, shares: Float) -> Float:
         """Return the nominal stress (s, n) MPa of all rows at shares (s, k)."""

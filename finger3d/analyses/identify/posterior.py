@@ -177,11 +177,8 @@ def _correlated(free: Sequence[FreeKey], correlation: Float, covariance: Float) 
     if np.linalg.eigvalsh(covariance).max() >= _UNTOLD**2:
         return []
     pairs = [(i, j) for i in range(len(free)) for j in range(i) if abs(correlation[i, j]) > _STRONG]
-    return [
-        f"{free[j].key} and {free[i].key} are correlated by {correlation[i, j]:.3f}: fix one, and the other is "
-        "known better"
-        for i, j in pairs
-    ]
+    told = [f"{free[j].key} and {free[i].key} are correlated by {correlation[i, j]:.3f}" for i, j in pairs]
+    return [f"{pair}: fix one, and the other is known better" for pair in told]
 
 
 def _bound(free: Sequence[FreeKey], shares: Float) -> list[str]:
@@ -201,9 +198,8 @@ def _maxima(key: FreeKey, samples: Samples, number: int) -> list[str]:
         if lost <= _PLAUSIBLE:
             ranges = [*ranges, [begin, end]] if is_apart else [*ranges[:-1], [ranges[-1][0], end]]
         is_apart = (is_apart and lost > _PLAUSIBLE) or lost > 2.0 * _PLAUSIBLE
-    reaches = [
-        end for end, at in (("below", ranges[1][0] < _TO_BOUND), ("above", ranges[-1][1] > 1.0 - _TO_BOUND)) if at
-    ]
+    ends = {"below": ranges[1][0] < _TO_BOUND, "above": ranges[-1][1] > 1.0 - _TO_BOUND}
+    reaches = [end for end, at in ends.items() if at]
     if len(reaches) == 1 and share.std() > _TO_BOUND:
         return [f"the data do not bound {key.key} from {reaches[0]}"]
     texts = [f"{key.value(a):.3g} to {key.value(b):.3g}" for a, b in ranges[1:]]

@@ -99,9 +99,8 @@ class MeasuredPress:
             row = int(np.argmax(np.abs(values)))
             found, extents = abs(float(values[row])), [float(np.abs(one[name]).max()) for one in simulated]
             least, most = min(extents), max(extents)
-            opposed = found > SHARPEST and all(
-                values @ one[name] < _OPPOSITE * np.linalg.norm(values) * np.linalg.norm(one[name]) for one in simulated
-            )
+            size, own = np.linalg.norm(values), [one[name] for one in simulated]
+            opposed = found > SHARPEST and all(values @ one < _OPPOSITE * size * np.linalg.norm(one) for one in own)
             if opposed or not least / _UNIT_RATIO - SHARPEST <= found <= most * _UNIT_RATIO + SHARPEST:
                 raise Finger3dError(
                     f"{self.path}: line {self.lines[row]}: {name} = {values[row]:g}: the scene gives up to "
@@ -131,9 +130,8 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
     indices = [name for name in INDEX if name in names]
     if not indices:
         has = ", ".join(repr(name)[:40] for name in table.names) or "no line of names"
-        raise Finger3dError(
-            f"{path}: must have a column {listed(INDEX)}, which says when a row was measured; it has {has}"
-        )
+        needed = f"a column {listed(INDEX)}, which says when a row was measured"
+        raise Finger3dError(f"{path}: must have {needed}; it has {has}")
     for base in (name.removesuffix(STD) for name in names):
         if base not in every:
             near = next((n for n in known if n.endswith(f"_{base}")), None) or nearest(base, list(known))
@@ -170,10 +168,8 @@ def check_stds(path: Path, lines: Sequence[int], name: str, stds: Float) -> None
     """Raise an error for the first standard deviation (n,) of a column that is out of range."""
     bad = np.flatnonzero((stds < _LEAST_STD) | (stds > _LARGEST_STD))
     if len(bad):
-        raise Finger3dError(
-            f"{path}: line {lines[int(bad[0])]}: {name}{STD} = {stds[bad[0]]:g}: must be from {_LEAST_STD:g} to "
-            f"{_LARGEST_STD:g}"
-        )
+        allowed = f"must be from {_LEAST_STD:g} to {_LARGEST_STD:g}"
+        raise Finger3dError(f"{path}: line {lines[int(bad[0])]}: {name}{STD} = {stds[bad[0]]:g}: {allowed}")
 
 
 def _direction(index: str, at: Float) -> float:
@@ -429,10 +425,9 @@ def check_rows(legs: tuple[Leg, ...], free: Sequence[FreeKey], measured: Measure
     path = np.array([0.0, *(getattr(target, measured.index) for target in targets(legs))])
     _check_range(measured, max((f.high for f in free if f.key == OFFSET), default=0.0), path)
     if measured.index == "depth_mm" and measured.at[-1] < _SHORTEST * path[-1]:
-        raise Finger3dError(
-            f"{measured.path}: line {measured.lines[-1]}: depth_mm = {measured.at[-1]:g}: the path of the scene "
-            f"ends at {path[-1]:g}; are the depths in mm? if so, lower press.depth_mm"
-        )
+        last = f"{measured.path}: line {measured.lines[-1]}: depth_mm = {measured.at[-1]:g}"
+        hint = "are the depths in mm? if so, lower press.depth_mm"
+        raise Finger3dError(f"{last}: the path of the scene ends at {path[-1]:g}; {hint}")
 
 
 def moving_part(path: Float, measured: MeasuredPress) -> slice:
@@ -448,10 +443,8 @@ def moving_part(path: Float, measured: MeasuredPress) -> slice:
     if (moves[first:] <= 0.0).any():
         other = "step" if measured.index == "time_s" else "time_s or step"
         verb = "rise" if measured.direction > 0.0 else "fall"
-        raise Finger3dError(
-            f"{measured.path}: {measured.index} does not {verb} throughout the path of the scene; give {other} "
-            "instead, or a scene of the measured leg only"
-        )
+        what = f"{measured.index} does not {verb} throughout the path of the scene"
+        raise Finger3dError(f"{measured.path}: {what}; give {other} instead, or a scene of the measured leg only")
     return slice(first, None)
 
 

@@ -42,10 +42,8 @@ def remote(address: str) -> Iterator[Client]:
         raise Finger3dError(f"--scheduler {address}: must be HOST:PORT, for instance tcp://127.0.0.1:8786")
     for name in ("distributed", "distributed.client"):  # the second has a level of its own in Dask's configuration
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    silent = MissingError(
-        f"--scheduler {address}: no Dask scheduler answered within {CONNECT_S:g} s; start one with `dask scheduler`, "
-        "or look at the address"
-    )
+    advice = "start one with `dask scheduler`, or look at the address"
+    silent = MissingError(f"--scheduler {address}: no Dask scheduler answered within {CONNECT_S:g} s; {advice}")
     try:
         asyncio.run(asyncio.wait_for(_greet(address), CONNECT_S))
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
@@ -116,15 +114,8 @@ class Cluster:
 
     def _submit(self, body: BodyPoints, address: str | None = None) -> None:
         """Send the next batch of a body, to the worker that has condensed it if that is still there."""
-        future = self.client.submit(
-            worker.batch,
-            body.spec,
-            body.next,
-            body.size,
-            pure=False,
-            workers=address and [address],
-            allow_other_workers=address is not None,
-        )
+        where = {"workers": address and [address], "allow_other_workers": address is not None}
+        future = self.client.submit(worker.batch, body.spec, body.next, body.size, pure=False, **where)
         self._running[future] = body, address
         future.add_done_callback(self._finished.put)
 

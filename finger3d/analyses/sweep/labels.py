@@ -59,9 +59,8 @@ def write_labels(folder: Path, sweep: Sweep, rows: Mapping[int, Row], columns: M
 
     done = [point for point in sweep.points if _part(folder, point.number).exists() and point.number in rows]
     with atomic(folder / FILE) as temporary, h5py.File(temporary, "w") as file:
-        file.attrs.update(
-            title=sweep.title, scene=json.dumps(sweep.given, default=str), versions=json.dumps(versions())
-        )
+        scene = json.dumps(sweep.given, default=str)
+        file.attrs.update(title=sweep.title, scene=scene, versions=json.dumps(versions()))
         for number, body in enumerate(sweep.bodies, start=1):
             of_body = [point.number for point in done if point.body == body]
             if of_body:
@@ -95,17 +94,10 @@ def _write_body(
 
 
 def _create(group: h5py.Group, name: str, count: int, values: NDArray[Any]) -> None:
-    data = group.create_dataset(
-        name,
-        (count, *values.shape),
-        values.dtype,
-        maxshape=(count, None, *values.shape[1:]),
-        chunks=(1, *values.shape),
-        compression="gzip",
-        compression_opts=1,
-        shuffle=True,
-        fillvalue=np.nan if values.dtype.kind == "f" else -1,
-    )
+    shape = {"shape": (count, *values.shape), "maxshape": (count, None, *values.shape[1:])}
+    packed = {"chunks": (1, *values.shape), "compression": "gzip", "compression_opts": 1, "shuffle": True}
+    missing = np.nan if values.dtype.kind == "f" else -1
+    data = group.create_dataset(name, dtype=values.dtype, fillvalue=missing, **shape, **packed)
     if name in FIELDS:
         data.attrs["description"] = FIELDS[name]
         data.attrs["axes"] = "sample, increment, x, z" + (", component" if values.ndim > 3 else "")

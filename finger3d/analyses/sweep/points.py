@@ -190,10 +190,8 @@ def checked_points(
         changes = [f"{key}={text}" for key, text in zip(keys, texts, strict=True)]
         scene = parse(tree.override(base, changes, option), path=path, set_keys=options)
         if scene.tables.mesh.tolerance is not None:
-            raise Finger3dError(
-                f"{path or scene.title}: mesh.tolerance chooses a mesh for one press; give a sweep mesh.size_mm, for "
-                "instance what finger3d press has chosen, in its summary.json"
-            )
+            advice = "give a sweep mesh.size_mm, for instance what finger3d press has chosen, in its summary.json"
+            raise Finger3dError(f"{path or scene.title}: mesh.tolerance chooses a mesh for one press; {advice}")
         scenes.append(scene)
     scenes = _with_effects(scenes, report)
     if any(scene.tables.labels and "elastic_object" in scene.effects for scene in scenes):
@@ -206,17 +204,11 @@ def checked_points(
         named = {v.key: value for v, value in zip(vary, here, strict=True)}
         checked.append(Point(number, named, body, variant))
     grids = _grids({key: of[0][0] for key, of in members.items()})
-    shared = {
-        key: BodySpec(
-            key=key,
-            variants=_shaping([variant for _, variant in of], of[0][0].tables.labels),
-            mesh=finest([scene.model() for scene, _ in of]),
-            given=of[0][0].given,
-            grid=grids[key],
-            labels=of[0][0].tables.labels,
-        )
-        for key, of in members.items()
-    }
+    shared = dict[str, BodySpec]()
+    for key, of in members.items():
+        first, mesh = of[0][0], finest([scene.model() for scene, _ in of])
+        variants = _shaping([variant for _, variant in of], first.tables.labels)
+        shared[key] = BodySpec(key, variants, mesh, first.given, grids[key], first.tables.labels)
     return Sweep(bodies.absolute(base, path), vary, tuple(checked), shared, scenes[0].title, is_list)
 
 
@@ -227,12 +219,10 @@ def _shaping(variants: Sequence[Variant], labels: LabelsTable | None) -> tuple[V
 
 def _grids(scenes: Mapping[str, Scene]) -> dict[str, tuple[Marker, ...]]:
     """Return the markers of the grid of each body; bodies of different shape have one name for one place x, z."""
-    own = {
-        key: grid_markers(scene.design, table.spacing_mm, 3 if scene.domain == "solid" else 2)
-        if (table := scene.tables.marker_grid)
-        else ()
-        for key, scene in scenes.items()
-    }
+    own = dict[str, tuple[Marker, ...]]()
+    for key, scene in scenes.items():
+        table, dim = scene.tables.marker_grid, 3 if scene.domain == "solid" else 2
+        own[key] = grid_markers(scene.design, table.spacing_mm, dim) if table else ()
     places = sorted({_across(marker) for markers in own.values() for marker in markers})
     names = {place: f"grid_{k}" for k, place in enumerate(places, start=1)}
     return {key: tuple(replace(m, name=names[_across(m)]) for m in markers) for key, markers in own.items()}
@@ -252,14 +242,12 @@ def _with_effects(scenes: list[Scene], report: Progress) -> list[Scene]:
         model = scene.with_effects(scene.fixed_effects).model()
         return max(leg.force_N or 0.0 for leg in model.legs), model.largest_depth_mm / model.design.height_mm
 
+    def closed(scene: Scene) -> Scene:
+        return scene.with_effects([*scene.fixed_effects, *(name for name in used if name in scene.open_effects)])
+
     _, need = settled(max(open_ones, key=deepest), report)
     used = need.used if need else ()
-    return [
-        scene.with_effects([*scene.fixed_effects, *(n for n in used if n in scene.open_effects)])
-        if scene.open_effects
-        else scene
-        for scene in scenes
-    ]
+    return [closed(scene) if scene.open_effects else scene for scene in scenes]
 
 
 SAMPLERS = ("lhs", "random")
@@ -304,13 +292,11 @@ def drawn(sample: str, ranges: Sequence[str], seed: int) -> tuple[Vary, ...]:
     kind, _, text = sample.partition(":")
     count = int(text) if text.isdecimal() else 0
     if kind not in SAMPLERS or not 1 <= count <= MOST:
-        raise Finger3dError(
-            f"--sample {shown(sample)}: must be lhs:NUMBER or random:NUMBER, for instance {_SAMPLE_EXAMPLE}"
-        )
+        allowed = f"lhs:NUMBER or random:NUMBER, for instance {_SAMPLE_EXAMPLE}"
+        raise Finger3dError(f"--sample {shown(sample)}: must be {allowed}")
     if not ranges:
-        raise Finger3dError(
-            f"--sample {sample}: nothing varies; give at least one range, for instance {_SAMPLE_EXAMPLE}"
-        )
+        needed = f"give at least one range, for instance {_SAMPLE_EXAMPLE}"
+        raise Finger3dError(f"--sample {sample}: nothing varies; {needed}")
     if seed < 0:
         raise Finger3dError(f"--seed {seed}: must be 0 or more")
     bounds = [FreeKey.of(text, "--range", f"as in {_SAMPLE_EXAMPLE}") for text in ranges]

@@ -38,10 +38,9 @@ class Relaxation:
         Finger3dError
         """
         if domain == "plane-stress" and not self.bulk:
-            raise Finger3dError(
-                "effects.viscosity.bulk = false: not in plane stress, where the thickness follows neither modulus "
-                'alone; set bulk = true, or model.domain = "plane-strain" or "solid"'
-            )
+            why = "not in plane stress, where the thickness follows neither modulus alone"
+            advice = 'set bulk = true, or model.domain = "plane-strain" or "solid"'
+            raise Finger3dError(f"effects.viscosity.bulk = false: {why}; {advice}")
 
 
 @dataclass(frozen=True)

@@ -120,9 +120,8 @@ def changed(problem: Problem, model: Model) -> Problem:
             touch = model.first_contact
             system = replace(system, first_contact_mm=touch.first_contact_mm, place_mm=touch.place)
         return replace(problem, model=model, system=system, without_inclusions=changed(bare, model) if bare else None)
-    if any(getattr(model, name) != getattr(own, name) for name in _OF_MESH) or type(model.design) is not type(
-        own.design
-    ):
+    is_alike = all(getattr(model, name) == getattr(own, name) for name in _OF_MESH)
+    if not is_alike or type(model.design) is not type(own.design):
         raise Finger3dError("it changes the mesh")
     if model.mixed != own.mixed:
         raise Finger3dError("it switches between elements for compressible and nearly incompressible materials")
@@ -231,9 +230,8 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
     added = bars.in_mesh(compliance[-count:, -count:])
     first = len(compliance) - len(added.subgrid_compliance)
     compliance[first:, first:] += added.subgrid_compliance
-    delassus, reading_rows = contact_rows(
-        stiffened(compliance, bars.bar_stiffness), active, problem.system.surface, readings
-    )
+    rows = stiffened(compliance, bars.bar_stiffness)
+    delassus, reading_rows = contact_rows(rows, active, problem.system.surface, readings)
     return replace(
         problem,
         condensed_body=replace(problem.body, condensed=replace(condensed, compliance=compliance)),

@@ -181,9 +181,8 @@ class ContactGeometry:
 
     def angles(self, other: ContactGeometry) -> Float:
         """Return the angles (c,) rad between the normals and those of another geometry."""
-        return np.asarray(
-            2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(self.bases[:, 0] - other.bases[:, 0], axis=1), 1.0))
-        )
+        chord = np.linalg.norm(self.bases[:, 0] - other.bases[:, 0], axis=1)
+        return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)))
 
     def holding(self, held: NDArray[np.bool_], other: ContactGeometry) -> ContactGeometry:
         """Return this geometry with the gradients and directions of another one at some points (c,)."""

@@ -169,11 +169,9 @@ class ObjectBody:
         options = MeshOptions(size, max(size, min(self.model.mesh.base_size_mm, *extents)), mesher)
         axes = self.axes if axes is None else axes
         self.report.say("meshing the object")
-        return (
-            mesh_solid(design, options, zone, axes, self.report)[0]
-            if solid
-            else mesh_section(design, options, zone, axes)[0]
-        )
+        if solid:
+            return mesh_solid(design, options, zone, axes, self.report)[0]
+        return mesh_section(design, options, zone, axes)[0]
 
     def _held(self, held: HeldBody) -> Mesh:
         """Return the mesh of a design, turned and moved to where the object is."""
@@ -196,29 +194,21 @@ class ObjectBody:
         if obj.is_flat:
             low = high = 0.0
         else:
-            x, z = np.meshgrid(
-                np.linspace(-reach, reach, _SURFACE), np.linspace(-0.5 * finger.width_mm, 0.5 * finger.width_mm, 41)
-            )
-            rises = PlacedObject.of(obj, 0.0).height(
-                x.ravel(), z.ravel() if self.model.domain == "solid" else 0.0 * z.ravel()
-            )
+            half = 0.5 * finger.width_mm * (self.model.domain == "solid")
+            x, z = np.meshgrid(np.linspace(-reach, reach, _SURFACE), np.linspace(-half, half, 41))
+            rises = PlacedObject.of(obj, 0.0).height(x.ravel(), z.ravel())
             low, high = float(rises.min()), float(rises.max())
         height = self.height_mm + high - low
         design = designs()["block"](half_length_mm=reach, height_mm=height, width_mm=finger.width_mm)
         stretch = np.array([1.0, 1.0, 1.0, 1.0]) / [np.cos(tilt), np.cos(tilt), 1.0, 1.0]
         x0, x1, z0, z1 = np.array(self.zone) * stretch
         mesh = reflected(self._made(design, (x0, x1, z0, z1)), 1)
-        points = mesh.points.copy()
+        points, x, y = mesh.points.copy(), mesh.points[:, 0], mesh.points[:, 1] + height
         if obj.is_flat:
             c, s = np.cos(tilt), np.sin(tilt)
-            points[:, 0], points[:, 1] = (
-                c * mesh.points[:, 0] - s * (mesh.points[:, 1] + height),
-                (s * mesh.points[:, 0] + c * (mesh.points[:, 1] + height)),
-            )
-            return Mesh(points, mesh.cells, mesh.facets)
-        behind = 1.0 + points[:, 1] / height  # 0 on the surface, 1 on the far face
-        z_at = points[:, 2] if mesh.dim == 3 else 0.0 * points[:, 0]
-        points[:, 1] = (
-            PlacedObject.of(obj, 0.0).height(points[:, 0], z_at) * (1.0 - behind) + (high + self.height_mm) * behind
-        )
+            points[:, 0], points[:, 1] = c * x - s * y, s * x + c * y
+        else:
+            behind, z = y / height, points[:, 2] if mesh.dim == 3 else 0.0 * x  # 0 on the surface, 1 on the far face
+            surface = PlacedObject.of(obj, 0.0).height(x, z)
+            points[:, 1] = surface * (1.0 - behind) + (high + self.height_mm) * behind
         return Mesh(points, mesh.cells, mesh.facets)

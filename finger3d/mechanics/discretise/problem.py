@@ -24,6 +24,7 @@ from finger3d.fem.surface import BoundarySurface, joined, surface
 from finger3d.mechanics.discretise.contact_points import ContactPoints, contact_geometry, may_touch
 from finger3d.mechanics.discretise.symmetry import Symmetry
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.path import targets
 from finger3d.mechanics.readings import Column, MeshedBody
 from finger3d.meshing.limits import MeshReport
 from finger3d.objects import ObjectPose, PlacedObject, SecondFinger, vertical_frame
@@ -178,14 +179,6 @@ class Problem:
         return ObjectPose(0.0)
 
     @property
-    def last_pose(self) -> ObjectPose:
-        """Pose at the end of the path."""
-        pose = self.origin
-        for leg in self.model.legs:
-            pose = leg.end(pose)
-        return pose
-
-    @property
     def dim(self) -> int:
         """Space dimensions."""
         return self.system.points.dim
@@ -214,7 +207,7 @@ class Problem:
         """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
         c = len(self.system.delassus)
         blocks = self.system.delassus[np.arange(c), :, np.arange(c)]
-        last = PlacedObject.of(self.model.object, self.system.first_contact_mm, self.last_pose)
+        last = self.placed(targets(self.model.legs)[-1])
         turned = contact_geometry(last.distance, self.surface, axes=self.axes).from_reference
         return uniqueness(np.full(c, self.model.friction.largest), turned @ blocks @ turned.transpose(0, 2, 1))
 

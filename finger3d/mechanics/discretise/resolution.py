@@ -12,8 +12,9 @@ normal, and points of walls and ends count too: a flank may touch the finger fro
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -242,7 +243,8 @@ def unresolved_overlap(
             )
             unresolved = replace(unresolved, in_contact=touched)
         missed = vertical - overlap[around].max(axis=1)
-        worst, depth = _worst(model, free, placed, places, vertical, missed, _WARN_ABOVE * deepest)
+        along_normals = partial(_along_normals, model, free, placed)
+        worst, depth = _worst(along_normals, places, vertical, missed, _WARN_ABOVE * deepest)
         if landmarks is None and not any(slide):  # the overlap is largest at first touch, wherever that is
             depth = max(depth, target.depth_mm - float(overlap.max()))
         if depth > unresolved.depth_mm:
@@ -252,24 +254,19 @@ def unresolved_overlap(
 
 
 def _worst(
-    model: Model,
-    free: BoundarySurface,
-    placed: PlacedObject,
-    places: Float,
-    overlap: Float,
-    missed: Float,
-    least: float,
+    along_normals: Callable[[Float, Float, Float], Float], places: Float, overlap: Float, missed: Float, least: float
 ) -> tuple[int, float]:
     """Return the number of the place with the largest unresolved overlap, and that overlap (mm).
 
-    The vertical ones are bounds of those along normals, which are looked at from the largest down to `least`.
+    The vertical ones are bounds of those along normals, which are looked at from the largest down to `least`, as
+    `_along_normals` returns them.
     """
     order, left, largest = np.argsort(-missed), missed.copy(), -math.inf
     for first in range(0, len(order), _AT_ONCE):
         some = order[first : first + _AT_ONCE]
         if missed[some[0]] <= max(largest, least):
             break
-        left[some] = _along_normals(model, free, placed, places[some], overlap[some], missed[some])
+        left[some] = along_normals(places[some], overlap[some], missed[some])
         largest = max(largest, float(left[some].max()))
     worst = int(left.argmax())
     return worst, float(left[worst])

@@ -193,16 +193,9 @@ class FiniteStrainWorkspace(Workspace):
 
 def contact_of(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:
     """Return the contact of a face displaced by u (n, d) with the object in a pose."""
-    gap, normal = problem.placed(target).distance(face.samples + face.interpolate @ u)
-    return deformed_contact(
-        face,
-        points=problem.mesh.points,
-        displacement=u,
-        gap=gap,
-        normal=normal,
-        axes=problem.axes,
-        object_share=problem.system.object_share if face is problem.surface else None,
-    )
+    distance = problem.placed(target).distance(face.samples + face.interpolate @ u)
+    object_share = problem.system.object_share if face is problem.surface else None
+    return deformed_contact(face, problem.mesh.points, u, distance, problem.axes, object_share)
 
 
 def curvature_of(

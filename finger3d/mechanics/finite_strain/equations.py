@@ -217,10 +217,8 @@ class IncrementEquations:
         n = self.problem.mesh.points.size
 
         largest = float(np.abs(step[:n]).max())
-        whole, fall = (
-            min(1.0, self._largest_step / largest) if largest else 1.0,
-            -float(step[:n] @ self.out_of_balance(now, force)[:n]),
-        )
+        whole = min(1.0, self._largest_step / largest) if largest else 1.0
+        fall = -float(step[:n] @ self.out_of_balance(now, force)[:n])
         if fall < 0.0:
             step, fall = (-step, -fall) if whole < 1.0 else (step, math.inf)
         after = None
@@ -308,15 +306,9 @@ class IncrementEquations:
         free_displacement = self.relative_displacement(now, force) + at_points(displacement)
         free_displacement -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free_displacement[:, 1:] += start.tangential_displacement
-        contact = ContactProblem.of(
-            start,
-            free_displacement,
-            delassus,
-            problem.model.friction,
-            self.length_scale,
-            self._augmentation,
-            problem.surface.area,
-        )
+        law, area = problem.model.friction, problem.surface.area
+        contact = ContactProblem.of(start, free_displacement, delassus, law, self.length_scale, area)
+        contact = replace(contact, augmentation=self._augmentation, is_definite=False)
         turning = np.zeros((force.size, 0 if turned is None else turned.shape[1]))
         for k, one in enumerate([] if turned is None else turned.T):
             turning[:, k] = at_points(one).ravel()
@@ -380,9 +372,8 @@ class IncrementEquations:
         mu = tangential / np.where(normal > 0.0, normal, 1.0)
         unbalanced = out_of_balance.copy()
         unbalanced[problem.body.fixed_dofs] = 0.0
-        equilibrium = float(np.abs(unbalanced[:n]).max()) / max(
-            float(np.linalg.norm(force, axis=1).max()), self._least_force
-        )
+        largest = max(float(np.linalg.norm(force, axis=1).max()), self._least_force)
+        equilibrium = float(np.abs(unbalanced[:n]).max()) / largest
         volume = float(np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean())
         volume *= problem.body.thickness / math.factorial(mesh.dim) * self.body.solid.pressure_scale
         dilatation = float(np.abs(unbalanced[n:]).max(initial=0.0)) / volume

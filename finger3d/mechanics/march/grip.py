@@ -105,34 +105,22 @@ def _both(finger: Problem, base: float, second: SecondFinger) -> Problem:
     symmetry = finger.symmetry
     if model.finite_strain:
         elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
-        body = replace(
-            body,
-            mesh=mesh,
-            elastic=elastic,
-            stiffness=stiffness(mesh, elastic, body.thickness),
-            fixed_dofs=held_dofs(mesh, finger.axes, model.held_ends),
-        )
-    return replace(
-        finger,
-        model=model,
-        condensed_body=body,
-        symmetry=replace(
-            symmetry,
-            image_of=np.concatenate([symmetry.image_of, symmetry.image_of + count]),
-            mirror_sign=np.tile(symmetry.mirror_sign, (2, 1)),
-            multiplicity=np.tile(symmetry.multiplicity, 2),
-        ),
-        system=ContactSystem(
-            surface=surface,
-            points=system.points,
-            delassus=delassus.reshape(2 * count, finger.dim, 2 * count, finger.dim),
-            reading_rows=np.zeros((0, 2 * count * finger.dim)),
-            active_dofs=np.concatenate([system.active_dofs, system.active_dofs + count * finger.dim]),
-            first_contact_mm=system.first_contact_mm,
-            place_mm=system.place_mm,
-            second=second,
-        ),
+        stiff, fixed = stiffness(mesh, elastic, body.thickness), held_dofs(mesh, finger.axes, model.held_ends)
+        body = replace(body, mesh=mesh, elastic=elastic, stiffness=stiff, fixed_dofs=fixed)
+    image_of = np.concatenate([symmetry.image_of, symmetry.image_of + count])
+    sign, multiplicity = np.tile(symmetry.mirror_sign, (2, 1)), np.tile(symmetry.multiplicity, 2)
+    symmetry = replace(symmetry, image_of=image_of, mirror_sign=sign, multiplicity=multiplicity)
+    system = ContactSystem(
+        surface=surface,
+        points=system.points,
+        delassus=delassus.reshape(2 * count, finger.dim, 2 * count, finger.dim),
+        reading_rows=np.zeros((0, 2 * count * finger.dim)),
+        active_dofs=np.concatenate([system.active_dofs, system.active_dofs + count * finger.dim]),
+        first_contact_mm=system.first_contact_mm,
+        place_mm=system.place_mm,
+        second=second,
     )
+    return replace(finger, model=model, condensed_body=body, symmetry=symmetry, system=system)
 
 
 def two(mesh: Mesh, base: float) -> Mesh:

@@ -65,10 +65,8 @@ def new_mesh(
         points, tets = run_child(glued, field, netgen_limit_s(cells))
         return on_cad(points, tets, body, "netgen"), design.volume_mm3, cad_seconds
     except UnusableMeshError as error:  # the same again
-        raise Finger3dError(
-            f"{design.name}: netgen cannot mesh with size_mm = {options.size_mm:g}: {error}; try other sizes, or "
-            "mesher = 'ftetwild'"
-        ) from error
+        what = f"netgen cannot mesh with size_mm = {options.size_mm:g}: {error}"
+        raise Finger3dError(f"{design.name}: {what}; try other sizes, or mesher = 'ftetwild'") from error
 
 
 def size_points(field: Sizing) -> tuple[Float, Float]:
@@ -102,12 +100,5 @@ def run_child(glued: Glued, field: Sizing, limit: float) -> tuple[Float, Int]:
         export_step(Compound(glued.shape.solids()), path)
         step = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     points, sizes = size_points(field)
-    return run_mesher(
-        _meshers.netgen,
-        limit,
-        step=step,
-        rate=RATE,
-        largest=_EDGE_SHARE * field.base_mm,
-        points=points,
-        sizes=_EDGE_SHARE * sizes,
-    )
+    largest, sizes = _EDGE_SHARE * field.base_mm, _EDGE_SHARE * sizes
+    return run_mesher(_meshers.netgen, limit, step=step, rate=RATE, largest=largest, points=points, sizes=sizes)

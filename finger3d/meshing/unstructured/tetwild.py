@@ -81,10 +81,8 @@ def new_mesh(
         except UnusableMeshError as error:
             reasons.append(str(error))
             report.say(f"this mesh will not do: {error}; meshing again")
-    raise Finger3dError(
-        f"{design.name}: {ATTEMPTS} attempts to mesh with size_mm = {options.size_mm:g} failed, the last because "
-        f"{reasons[-1]}; try other sizes, or mesher = 'swept'"
-    )
+    failed = f"{ATTEMPTS} attempts to mesh with size_mm = {options.size_mm:g} failed, the last because {reasons[-1]}"
+    raise Finger3dError(f"{design.name}: {failed}; try other sizes, or mesher = 'swept'")
 
 
 def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tessellation, float]:
@@ -100,10 +98,8 @@ def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tes
     diagonal = float(np.linalg.norm(field.high - field.low))
     # With an envelope below the sagitta of the longest edge a hemisphere takes 20 times as long, with too fine a mesh.
     least, usual, most = _ENVELOPE
-    epsilon = min(
-        max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _ENVELOPE_SHARE * field.size_mm / diagonal
-    )
-    epsilon = max(epsilon, least)
+    epsilon = max(usual, field.base_mm**2 / (8.0 * radius * diagonal))
+    epsilon = max(min(epsilon, most, _ENVELOPE_SHARE * field.size_mm / diagonal), least)
     if faceted:
         return coarser(faceted, _DECIMATION_SHARE * epsilon * diagonal), epsilon
     assert glued is not None
@@ -118,10 +114,9 @@ def _within_layers(design: Design, glued: Glued, epsilon: float, diagonal: float
         thickness = 2.0 * glued.volumes_mm3[number] / area if area else math.inf
         epsilon = min(epsilon, _ENVELOPE_SHARE * thickness / diagonal)
         if epsilon < _ENVELOPE[0]:
-            raise Finger3dError(
-                f"{design.name}: the part '{label}' is {thickness:.3g} mm thin; mesh.mesher = 'ftetwild' needs at "
-                f"least {at_least(_ENVELOPE[0] * diagonal / _ENVELOPE_SHARE, 3)} mm, or mesher = 'swept' or 'netgen'"
-            )
+            least = at_least(_ENVELOPE[0] * diagonal / _ENVELOPE_SHARE, 3)
+            needs = f"mesh.mesher = 'ftetwild' needs at least {least} mm, or mesher = 'swept' or 'netgen'"
+            raise Finger3dError(f"{design.name}: the part '{label}' is {thickness:.3g} mm thin; {needs}")
     return epsilon
 
 
@@ -150,17 +145,7 @@ def run_child(
 
     pytetwild finds the inside by winding numbers, which triangles inside the body would make ambiguous.
     """
-    bg_points, bg_tets, bg_values = field.background()
-    return run_mesher(
-        _meshers.pytetwild,
-        limit,
-        points=points,
-        triangles=triangles,
-        edge_length=field.longest_mm,
-        epsilon=epsilon,
-        stop_energy=STOP_ENERGY,
-        keep_outside=keep_outside,
-        bg_points=bg_points,
-        bg_tets=bg_tets,
-        bg_values=bg_values,
-    )
+    surface = {"points": points, "triangles": triangles}
+    limits = {"edge_length": field.longest_mm, "epsilon": epsilon, "stop_energy": STOP_ENERGY}
+    sizes = dict(zip(("bg_points", "bg_tets", "bg_values"), field.background(), strict=True))
+    return run_mesher(_meshers.pytetwild, limit, **surface, **limits, keep_outside=keep_outside, **sizes)
