@@ -21,3 +21,29 @@ OBJECTS: Mapping[str, type[RigidObject]] = MappingProxyType(
     }
 )
 """The objects that a scene's ``[object]`` table may name, by shape. A new object is one more entry."""
+
+__all__ = [
+    "OBJECTS",
+    "TIME",
+    "Axis",
+    "Box",
+    "ContactPath",
+    "Cylinder",
+    "DistanceTracker",
+    "FirstTouch",
+    "HeldBody",
+    "InitialContact",
+    "MeshObject",
+    "Move",
+    "ObjectPose",
+    "PlacedObject",
+    "Plane",
+    "RigidObject",
+    "SecondFinger",
+    "Sphere",
+    "Wave",
+    "Wedge",
+    "first_touch",
+    "initial_contact",
+    "vertical_frame",
+]

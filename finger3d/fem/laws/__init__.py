@@ -3,3 +3,5 @@
 from finger3d.fem.laws.base import IsochoricLaw
 from finger3d.fem.laws.invariants import MooneyRivlin, NeoHooke, Yeoh
 from finger3d.fem.laws.ogden import Ogden
+
+__all__ = ["IsochoricLaw", "MooneyRivlin", "NeoHooke", "Ogden", "Yeoh"]
