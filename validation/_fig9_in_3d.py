@@ -25,7 +25,7 @@ judged = listed(__file__)
 
 SOLID = "solid"
 PLANES = (SOLID, STRAIN, STRESS)
-STEPS = {SOLID: 40, STRAIN: 1, STRESS: 1}
+STEPS = {SOLID: 40, STRAIN: 320, STRESS: 320}
 
 
 def run(quick: bool) -> Result:

@@ -13,8 +13,7 @@ from finger3d.fem.mesh import unfold
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
 
-from ._paper import CASES, SHOWN, STRAIN, STRESS, Profile, fig9, half_cylinder, moved, said
-from ._press import under
+from ._paper import CASES, SHOWN, STRAIN, STRESS, Profile, fig9, half_cylinder, moved, pressed, said
 from ._rows import Result, Row, at_most, columns, together, zero
 
 
@@ -32,14 +31,14 @@ def _r5(quick: bool) -> Result:
     found, lines, rows = {}, [], []
     for plane, nu in CASES:
         problem = half_cylinder(nu, plane, size)
-        frame = under(problem, 0.25)[-1]
+        frame = pressed(problem, 0.25)[-1]
         profile = Profile.of(problem, frame)
         found[plane, nu] = (problem, frame, profile)
         widest = np.abs((moved(problem, frame) + problem.mesh.points)[:, 0]).max()
         lines.append((plane, nu, profile.force, profile.a, profile.deformed, profile.c, widest))
     for plane, nu in SHOWN:
         other = half_cylinder(nu, plane, size / 2.0)
-        fine = Profile.of(other, under(other, 0.25)[-1]).force
+        fine = Profile.of(other, pressed(other, 0.25)[-1]).force
         what, own = f"force at 1 mm, N per mm, {plane}, nu = {nu:g}", found[plane, nu][2].force
         source, why = "this code, edges half as long", "mesh: the corners of the base are singular"
         rows.append(Row(what, source, fine, own, 0.004 if quick else 0.002, why))
@@ -93,7 +92,7 @@ def _fig9(quick: bool) -> Result:
         for nu in NUS:
             problem = fig9(nu, plane, size)
             for mu in SHOWN_MU:
-                frame = under(problem, mu)[-1]
+                frame = pressed(problem, mu)[-1]
                 profile = Profile.of(problem, frame)
                 widths[plane, nu, mu] = (2.0 * profile.a, 2.0 * profile.deformed, 2.0 * profile.edge_error())
                 lines.append((plane, nu, mu, profile.force, *widths[plane, nu, mu], 2.0 * profile.c))

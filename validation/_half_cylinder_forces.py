@@ -14,8 +14,7 @@ from scipy.signal import find_peaks
 
 from finger3d.mechanics.discretise.build import build
 
-from ._paper import CASES, MUS, SHOWN, STRAIN, STRESS, Profile, by_mu, draw_shown, half_cylinder, said
-from ._press import under
+from ._paper import CASES, MUS, SHOWN, STRAIN, STRESS, Profile, by_mu, draw_shown, half_cylinder, pressed, said
 from ._rows import Result, Row, columns, together
 
 KNOWN = {0.2: (0.12668, 0.862, 0.639), 0.5: (0.40495, 1.508, 1.376), 1.0: (1.01932, 2.297, 2.230)}
@@ -37,7 +36,7 @@ def _depths(quick: bool) -> Result:
     found, lines = {}, []
     for plane, nu in CASES:
         problem = build(replace(half_cylinder(nu, plane, size).model, symmetry=()))
-        frames = under(problem, 0.25, 5)
+        frames = pressed(problem, 0.25, 5)
         found[plane, nu] = [Profile.of(problem, f) for f in frames]
         for frame, profile in zip(frames, found[plane, nu], strict=True):
             table = zip(profile.x, profile.p, profile.q, profile.status, strict=True)
@@ -50,7 +49,7 @@ def _depths(quick: bool) -> Result:
 
 def _reference(size: float) -> Iterator[Row]:
     problem = half_cylinder(0.3, STRESS, size)
-    frames = under(problem, 0.25, 10)
+    frames = pressed(problem, 0.25, 10)
     for depth, (force, a, c) in KNOWN.items():
         frame = min(frames, key=lambda f: abs(f.target.depth_mm - depth))
         profile = Profile.of(problem, frame)
@@ -115,7 +114,7 @@ def _zones(quick: bool) -> Result:
     found, lines = {}, []
     for plane, nu in CASES:
         problem = half_cylinder(nu, plane, size)
-        frames = under(problem, 0.25)
+        frames = pressed(problem, 0.25, 10)
         found[plane, nu] = [Profile.of(problem, f) for f in frames]
         for profile, frame in zip(found[plane, nu], frames, strict=True):
             line = (frame.target.depth_mm, profile.a, profile.c, profile.edge_error(), profile.slips_at_edges_only)
@@ -160,7 +159,7 @@ def _mus(quick: bool) -> Result:
     for plane, nu in CASES:
         problem = half_cylinder(nu, plane, size)
         for mu in MUS:
-            profile = Profile.of(problem, under(problem, mu)[-1])
+            profile = Profile.of(problem, pressed(problem, mu)[-1])
             found[plane, nu, mu] = profile
             outward = float((profile.q * np.sign(profile.x)) @ profile.area)
             zones = (profile.a, profile.c, profile.edge_error())

@@ -27,6 +27,7 @@ from ._paper import (
     draw_shown,
     half_cylinder,
     line_r5,
+    pressed,
     said,
     strains,
 )
@@ -53,7 +54,7 @@ def _depths(quick: bool) -> Result:
     for below in (BELOW_R5,) if quick else (BELOW_R5 / 2.0, BELOW_R5, 2.0 * BELOW_R5):
         x, gauges = line_r5(below, count)
         for plane, nu in CASES:
-            frames = under(half_cylinder(nu, plane, size, gauges), 0.25)
+            frames = pressed(half_cylinder(nu, plane, size, gauges), 0.25, 10)
             found[below, plane, nu] = np.array([strains(f, count) for f in frames])
             for frame, values in list(zip(frames, found[below, plane, nu], strict=True))[1::2]:
                 points, depth = zip(x, *values, strict=True), frame.target.depth_mm
@@ -108,7 +109,7 @@ def _mus(quick: bool) -> Result:
     for plane, nu in CASES:
         problem = half_cylinder(nu, plane, size, gauges)
         for mu in MUS:
-            frame = under(problem, mu, 1)[-1]
+            frame = pressed(problem, mu)[-1]
             half[plane, nu] = Profile.of(problem, frame).a
             for below, (x, _) in along.items():
                 key = (below, plane, nu, mu)
@@ -176,7 +177,7 @@ def _kinetic(quick: bool) -> Result:
     found, lines, rows = {}, [], []
     for plane, nu in SHOWN:
         problem = half_cylinder(nu, plane, size, gauges)
-        signal = np.ptp([strains(under(problem, mu)[-1], count)[2] for mu in MUS], axis=0).max()
+        signal = np.ptp([strains(pressed(problem, mu)[-1], count)[2] for mu in MUS], axis=0).max()
         for static in (0.25,) if quick else (0.25, 0.125, 0.5):
             for branch in BRANCHES:
                 for ratio in RATIOS:

@@ -26,7 +26,7 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 
-from ._press import fig9_finger
+from ._press import fig9_finger, under
 from ._rows import listed
 
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
@@ -60,6 +60,16 @@ def _built(design: Any, nu: float, plane: str, mesh: MeshOptions, gauges: Sequen
     domain: Any = plane.replace(" ", "-")
     legs, law = (Leg(depth_mm, steps=10),), Coulomb(0.25)
     return build(Model(design, Isotropic(1.0, nu), mesh, legs, friction=law, gauges=tuple(gauges), domain=domain))
+
+
+INCREMENTS = 320
+"""Increments of a press of a section: in ten, the friction sum of plane stress is 4 % off, and the stick zone up to a quarter."""
+
+
+def pressed(problem: Problem, mu: float, count: int = 1) -> list[StepResult]:
+    """Return `count` states of a press, evenly spaced, the last at full depth."""
+    every = INCREMENTS // count
+    return under(problem, mu, INCREMENTS)[every - 1 :: every]
 
 
 @dataclass(frozen=True)

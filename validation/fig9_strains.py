@@ -24,10 +24,11 @@ from ._paper import (
     half_cylinder,
     line,
     line_r5,
+    pressed,
     said,
     strains,
 )
-from ._press import fig9_finger, under
+from ._press import fig9_finger
 from ._rows import Result, Row, columns, together
 
 NUS = (0.3, 0.45, 0.49)
@@ -53,8 +54,8 @@ def _shear(quick: bool) -> Result:
             problem = fig9(nu, plane, size, line(x, fig9_finger(1.0), BELOW_FIG9))
             r5, gauges = line_r5(count=21)
             other = half_cylinder(nu, plane, size / 10.0, gauges)
-            small[plane, nu] = np.array([strains(under(other, mu, 1)[-1], len(r5))[2] for mu in MUS])
-            frames = [under(problem, mu, 1)[-1] for mu in MUS]
+            small[plane, nu] = np.array([strains(pressed(other, mu)[-1], len(r5))[2] for mu in MUS])
+            frames = [pressed(problem, mu)[-1] for mu in MUS]
             found[plane, nu] = np.array([strains(f, count)[2] for f in frames])
             slip[plane, nu] = [(p.a, p.c) for p in (Profile.of(problem, f) for f in frames)]
             for mu, values in zip(MUS, found[plane, nu], strict=True):
@@ -123,7 +124,7 @@ def _gauges(quick: bool) -> Result:
     found, lines = {}, []
     for plane, nu in CASES:
         problem = fig9(nu, plane, 3.0 if quick else 0.5, gauges())
-        frames = [under(problem, float(mu), 1)[-1] for mu in mus]
+        frames = [pressed(problem, float(mu))[-1] for mu in mus]
         for below in DEPTHS:
             for angle in ANGLES:
                 strain = np.array([f.gauges[f"{below}:{angle}"] for f in frames])

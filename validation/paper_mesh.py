@@ -28,8 +28,7 @@ from finger3d.fem.surface import strain_row
 from finger3d.geometry.design import designs
 from finger3d.meshing.grid import Sizes, rows
 
-from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains
-from ._press import under
+from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, pressed, said, strains
 from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.45), (STRAIN, 0.49))
@@ -100,7 +99,7 @@ def run(quick: bool) -> Result:
     for plane, nu in CASES:
         body, fine = Coarse.of(mesh, plane, nu), half_cylinder(nu, plane, 0.2 if quick else 0.05, gauges)
         for mu in MUS:
-            frame = under(fine, mu)[-1]
+            frame = pressed(fine, mu)[-1]
             profile = Profile.of(fine, frame)
             found[plane, nu, mu, "fine"] = (profile, strains(frame, len(x))[2])
             lines.append((plane, nu, mu, "fine", profile.force, profile.a, profile.c, profile.friction, 0, 0.0))
