@@ -63,7 +63,8 @@ def _built(design: Any, nu: float, plane: str, mesh: MeshOptions, gauges: Sequen
 
 
 INCREMENTS = 320
-"""Increments of a press of a section: in ten, the friction sum of plane stress is 4 % off, and the stick zone up to a quarter."""
+"""Increments of a press of a section. In ten, the friction sum of plane stress is 4 % off, and the stick zone a quarter
+too narrow."""
 
 
 def pressed(problem: Problem, mu: float, count: int = 1) -> list[StepResult]:
