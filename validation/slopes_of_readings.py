@@ -158,6 +158,7 @@ def _draw(figure: Any, found: Curves) -> None:
             for (_, _, size), c in ((k, c) for k, c in found.items() if k[:2] == (case, refinement)):
                 label = f"{size:g} mm: {c.dofs} unknowns, {c.points} points"
                 axes.plot(MUS, 1e3 * c.slope, "o-", ms=3, lw=1.5, label=label)
+            axes.set_visible(bool(axes.lines))
             kind = "no refinement" if refinement == PLAIN else "refined at the gauge"
             axes.set_title(f"{case}: {kind}", fontsize=9)
     for axes in panels[-1]:
