@@ -159,6 +159,7 @@ def _draw(figure: Any, found: Curves) -> None:
                 label = f"{size:g} mm: {c.dofs} unknowns, {c.points} points"
                 axes.plot(MUS, 1e3 * c.slope, "o-", ms=3, lw=1.5, label=label)
             axes.set_visible(bool(axes.lines))
+            axes.tick_params(labelleft=axes is row[0] or not row[0].lines)
             kind = "no refinement" if refinement == PLAIN else "refined at the gauge"
             axes.set_title(f"{case}: {kind}", fontsize=9)
     for axes in panels[-1]:
