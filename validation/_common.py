@@ -278,10 +278,12 @@ def body(
 
 
 def ellipse(x: Float, p: Float, reach: float) -> tuple[float, float]:
-    """Half-width (mm) and peak (MPa) of Hertz's pressure by the line of p^2 over x^2 within |x| < `reach`."""
+    """Half-width (mm; NaN if p does not fall) and peak (MPa) of Hertz's pressure by the line of p^2 over x^2 within
+    |x| < `reach`.
+    """
     inner = np.abs(x) < reach
     slope, top = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
-    return float(np.sqrt(-top / slope)), float(np.sqrt(top))
+    return float(np.sqrt(-top / slope)) if slope < 0.0 else np.nan, float(np.sqrt(top))
 
 
 def ellipse_error(x: Float, p: Float, a: float, peak: float) -> float:
