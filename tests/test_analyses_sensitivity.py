@@ -80,6 +80,7 @@ def test_effects_are_differences_of_presses(effects: dict[str, Any]) -> None:
             assert (effect.falling, effect.growing) == pytest.approx(wanted, rel=1e-4, abs=1e-7 * size), (key, number)
 
 
+@pytest.mark.slow
 def test_errors_hold_on_a_finer_mesh() -> None:
     given = scene(**SECTION | {"effects": {"auto": False}})
     found = finger3d.sensitivity(given, NUMBERS)

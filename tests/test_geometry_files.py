@@ -181,7 +181,10 @@ def step_with_base(path: Path, solid: Any, *bases: Any) -> Path:
     return path
 
 
-@pytest.mark.parametrize("turn", [(90.0, 0.0, 0.0), (0.0, 0.0, 90.0), (0.0, 0.0, 180.0), (31.0, 0.0, 17.0), (0, 0, 0)])
+SLOW_TURNS = [pytest.param(t, marks=pytest.mark.slow) for t in ((0.0, 0.0, 90.0), (0.0, 0.0, 180.0), (0.0, 0.0, 0.0))]
+
+
+@pytest.mark.parametrize("turn", [(90.0, 0.0, 0.0), (31.0, 0.0, 17.0), *SLOW_TURNS])
 def test_the_face_named_base_is_turned_down(tmp_path: Path, turn: tuple[float, float, float]) -> None:
     from build123d import Axis, Rot
 

@@ -182,6 +182,7 @@ def test_the_picture_shows_the_gauge_beside_the_pressure_only(
     assert not marked[:, half:].any()
 
 
+@pytest.mark.slow
 def test_pyvista_draws_a_solid_where_opengl_works(tmp_path: Path, of_solid: tuple[Mesh, dict[str, Any]]) -> None:
     mesh, result = of_solid
     tiny = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot()"

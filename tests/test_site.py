@@ -56,6 +56,7 @@ def columns_of(path: Path) -> set[str]:
     return set(path.read_text(encoding="utf-8").splitlines()[0].split(","))
 
 
+@pytest.mark.slow
 def test_the_page_of_the_other_commands_names_what_they_write(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

@@ -19,7 +19,8 @@ SLOW = (
     "effects_by_need", "cost_of_accuracy", "hertz", "bonded", "wide_finger", "gelsight_mini", "cost_forecast",
     "held_weights", "creep_of_a_hold", "friction_range", "what_each_effect_does", "identify_z_scores", "truth_cube",
     "random_presses", "effects_of_keys", "slip_warning", "solids4foam", "label_rate", "beside_ansys", "meunier",
-    "press_with_friction",
+    "press_with_friction", "sharp_profiles", "inclined_contact", "cattaneo_mindlin", "teeth_and_walls",
+    "two_elastic_bodies", "limit_surface", "plane_strain_limit", "small_fingers",
 )  # fmt: skip
 """Studies that take about four seconds or more in their quick form; `make test-all` runs them."""
 
