@@ -216,6 +216,6 @@ def _draw(figure: Any, lifts: list[Lift]) -> None:
     axes.plot([x.mu for x in slips], [x.ratio for x in slips], "rx", ms=10, label="slips")
     axes.axhline(1.0, color="k", lw=0.8, label="least, by Coulomb's law")
     axes.axhline(1.3, color="k", lw=0.8, ls=":", label="1.3 times the least")
-    axes.set(xlabel="mu of the object", ylabel="normal force over the least", yscale="log")
+    axes.set(xlabel="mu of the object", ylabel="normal force over the least")
     axes.set_title(f"{len(acted) - len(slips)} of {len(acted)} lifted without slip")
     figure.colorbar(drawn, ax=axes, pad=0.01).ax.set_title("noise,\n1e-3", fontsize=8)
