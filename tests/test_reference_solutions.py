@@ -23,7 +23,7 @@ from finger3d.mechanics.model import Leg
 from tests.designs import GOOD, make
 from tests.energies import energy_of_body
 from tests.models import block, fig9
-from validation import _spence, press_with_friction, viscous_sphere
+from validation import _half_cylinder_forces, _spence, press_with_friction, viscous_sphere
 from validation._increments import imbalance
 
 
@@ -191,3 +191,10 @@ def test_a_design_file_runs_alone() -> None:
     done = subprocess.run([sys.executable, str(file)], capture_output=True, text=True, check=True, timeout=120)
     assert "radius_mm=5.0" in done.stdout
     assert "volume 392.699 mm3, CAD 392.699 mm3" in done.stdout
+
+
+def test_the_half_cylinder_of_the_paper_sticks_where_its_reference_does() -> None:
+    """Ten increments leave the stick zone at a fifth of the depth a quarter too narrow."""
+    rows = list(_half_cylinder_forces._reference(0.05))
+    assert [row.what for row in rows if not row.passed] == []
+    assert len(rows) == 9
