@@ -90,8 +90,10 @@ def _hyperelastic(law: IsochoricLaw, d1: float) -> tuple[str, ...]:
             terms = [number for share, alpha in law.terms for number in (share * law.shear, alpha)]
             return _cards(f"OGDEN, N={len(law.terms)}", [*terms, d1, *(len(law.terms) - 1) * [_NO_TERM * d1]])
         case Ogden():
-            has = f"CalculiX has Ogden's law with up to {MOST_TERMS} terms, and the scene {len(law.terms)}"
-            raise Finger3dError(f"--solver calculix: effects.large_deformation.terms: {has}")
+            raise Finger3dError(
+                f"--solver calculix: effects.large_deformation.terms: CalculiX has Ogden's law with up to {MOST_TERMS} "
+                f"terms, and the scene {len(law.terms)}"
+            )
     raise Finger3dError(f"--solver calculix: CalculiX has no equal of effects.large_deformation's {type(law).__name__}")
 
 
@@ -334,9 +336,10 @@ def object_elements(
     if not isinstance(obj, Plane):
         facets = _near(facets, placed, low, high)
     if not 0 < len(facets.faces) <= MOST_FACETS:
-        near = f"{len(facets.faces)} facets of the object come near the finger"
-        allowed = f"CalculiX takes 1 to {MOST_FACETS}: press deeper, or simplify the object"
-        raise Finger3dError(f"--solver calculix: {near}; {allowed}")
+        raise Finger3dError(
+            f"--solver calculix: {len(facets.faces)} facets of the object come near the finger; CalculiX takes 1 to "
+            f"{MOST_FACETS}: press deeper, or simplify the object"
+        )
     own, kind, elements = _backed(obj, facets)
     motion = np.array([pose.to_scene(own) for pose in placed])
     return ObjectElements(motion[0], kind, elements), motion - motion[0]
@@ -541,8 +544,10 @@ def _check(model: Model) -> None:
         filled = dict(model.filled).get("friction", type(model.friction).__name__)
         raise Finger3dError(f"--solver calculix: CalculiX has no equal of [effects.{filled}]; take it out")
     if model.is_under_force:
-        why = "a deck moves the object by depths and slides; give depth_mm, for instance what `finger3d press` finds"
-        raise Finger3dError(f"--solver calculix: force_N: {why}, and slides in place of force_x_N and force_z_N")
+        raise Finger3dError(
+            "--solver calculix: force_N: a deck moves the object by depths and slides; give depth_mm, for instance "
+            "what `finger3d press` finds, and slides in place of force_x_N and force_z_N"
+        )
     if model.held_ends:
         raise Finger3dError("--solver calculix: ends that are held cannot be written")
     if model.finite_strain and model.domain == "plane-stress":

@@ -149,8 +149,9 @@ class GaugeFields:
             variance = variance + (0.5 * turned) ** 2
         if self.coarse is not None:
             variance = variance + self.tolerances["mesh"] ** 2 * self._mesh_error(points, angles) ** 2
-        stacked = np.stack(effects, axis=-1).reshape(-1, len(self.mus), len(effects))
-        return ReadingEffects(stacked, variance.reshape(-1, len(self.mus)))
+        return ReadingEffects(
+            np.stack(effects, axis=-1).reshape(-1, len(self.mus), len(effects)), variance.reshape(-1, len(self.mus))
+        )
 
     def _mesh_error(self, points: Float, angles: Float) -> Float:
         """Return the error (p, a, m) of the strain due to the mesh, the root mean square around each point.
@@ -343,8 +344,9 @@ class GaugeSet:
 
     def fisher(self, without: int | None = None) -> Float:
         """Return the Fisher matrices (m, 1 + q, 1 + q) of all gauges but one."""
-        kept = (gauge.fisher for i, gauge in enumerate(self.gauges) if i != without)
-        return self.prior + sum(kept, start=np.zeros_like(self.prior))
+        return self.prior + sum(
+            (g.fisher for i, g in enumerate(self.gauges) if i != without), start=np.zeros_like(self.prior)
+        )
 
     @property
     def mu_sd(self) -> Float:
@@ -390,8 +392,10 @@ def search(
     for number in range(count):
         best, value = _best(found, everywhere)
         if not math.isfinite(value):
-            room = f"only {number} have room {spacing_mm:g} mm apart within these bounds"
-            raise Finger3dError(f"optimise --gauges {count}: {room}; lower --spacing, or widen the bounds")
+            raise Finger3dError(
+                f"optimise --gauges {count}: only {number} have room {spacing_mm:g} mm apart within these bounds; "
+                "lower --spacing, or widen the bounds"
+            )
         found = found.placed(best)
         report.stage(f"{number + 1} gauge{'s' if number else ''}: mu +- {found.objective:.3g} in the mean")
     found = _exchanged(found, lambda _: everywhere)
@@ -519,9 +523,10 @@ def place_gauges(
     scene = parse(given, path)
     model = scene.model()
     if model.inclusions is not None:
-        why = "not with effects.embedded_gauge, whose foils change the body wherever they lie"
-        advice = "find the places without it, or optimise one gauge with --free gauge.NAME.x_mm"
-        raise Finger3dError(f"optimise --gauges: {why}; {advice}")
+        raise Finger3dError(
+            "optimise --gauges: not with effects.embedded_gauge, whose foils change the body wherever they lie; "
+            "find the places without it, or optimise one gauge with --free gauge.NAME.x_mm"
+        )
     region = _region(model, keys)
     with claimed(out, "optimise") as folder:
         fields = GaugeFields.of(model, mus, noise, with_defaults(tolerances, largest_spread(scene.tables)), report)
@@ -538,8 +543,10 @@ def _region(model: Model, free: Sequence[FreeKey]) -> Region:
     bounds = {}
     for key in free:
         if key.key not in _BOUNDS:
-            allowed = f"with --gauges only {', '.join(_BOUNDS)} may be bounded, for instance --free gauge.y_mm=5:40"
-            raise Finger3dError(f"--free {key.key}: {allowed}")
+            raise Finger3dError(
+                f"--free {key.key}: with --gauges only {', '.join(_BOUNDS)} may be bounded, for instance "
+                "--free gauge.y_mm=5:40"
+            )
         ends = (key.low, key.high)
         bounds[_BOUNDS[key.key]] = ends if key.key != "gauge.angle_deg" else tuple(map(math.radians, ends))
     whole = Region.of(model)
@@ -547,8 +554,9 @@ def _region(model: Model, free: Sequence[FreeKey]) -> Region:
     for key in free:
         (low, high), own = getattr(region, _BOUNDS[key.key]), getattr(whole, _BOUNDS[key.key])
         if key.key in ("gauge.x_mm", "gauge.y_mm") and (high <= own[0] or low >= own[1]):
-            reach = f"it reaches from {own[0]:g} to {own[1]:g} mm"
-            raise Finger3dError(f"--free {key.key}={key.low:g}:{key.high:g}: {NOWHERE}; {reach}")
+            raise Finger3dError(
+                f"--free {key.key}={key.low:g}:{key.high:g}: {NOWHERE}; it reaches from {own[0]:g} to {own[1]:g} mm"
+            )
     return region
 
 
@@ -581,8 +589,10 @@ def _write(folder: Path, result: GaugePlaces, model: Model) -> None:
     columns: Tree = {f"{axis}_mm": places[:, i] for i, axis in enumerate("xyz")}
     columns |= {f"mean_mu_sd_g{i + 1}_here": values for i, (_, values) in enumerate(result.maps)}
     write_csv(folder / "map.csv", columns)
-    of_gauges = zip(result.found.gauges, result.found.alone, result.maps, strict=True)
-    shown = [GaugeMap(float(g.place[0]), float(g.place[1]), g.angle, own, *one) for g, own, one in of_gauges]
+    shown = [
+        GaugeMap(float(g.place[0]), float(g.place[1]), g.angle, own, *one)
+        for g, own, one in zip(result.found.gauges, result.found.alone, result.maps, strict=True)
+    ]
     draw_places(folder / "map.png", result.mus, result.found.mu_sd, shown, model.design)
     write_json(folder / "gauges.json", result.as_dict())
     gauge_places_page(folder).write(folder)

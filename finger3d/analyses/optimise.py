@@ -285,7 +285,9 @@ class Search:
     def write_table(self, path: Path) -> None:
         """Write every evaluated design as a line of a CSV file."""
         known = list(self.known.values())
-        columns = {key.key: [e.values[i] for e in known] for i, key in enumerate(self.problem.free)}
+        columns: dict[str, list[float] | list[str]] = {
+            key.key: [e.values[i] for e in known] for i, key in enumerate(self.problem.free)
+        }
         write_csv(path, {**columns, "objective": [e.value for e in known], "outcome": [e.outcome for e in known]})
 
     def best(self) -> Evaluation | None:

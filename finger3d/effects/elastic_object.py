@@ -31,22 +31,27 @@ class Effect:
         """Fill the slot of the object's compliance."""
         obj = model.object
         if self.height_mm is not None and not obj.is_face:
-            what = "only for a plane, wedge or wave, which are the face of a block"
-            others = "a cylinder, a sphere and a mesh are held where they are cut, or on top"
-            raise Finger3dError(f"effects.elastic_object.height_mm: {what}; {others}; take it out")
+            raise Finger3dError(
+                "effects.elastic_object.height_mm: only for a plane, wedge or wave, which are the face of a block; a "
+                "cylinder, a sphere and a mesh are held where they are cut, or on top; take it out"
+            )
         if not obj.has_section and model.domain != "solid":
             raise Finger3dError('effects.elastic_object: a mesh as object has no section; set model.domain = "solid"')
         if obj.is_turned:
-            advice = "take turn_x_deg, turn_y_deg and turn_z_deg out"
-            raise Finger3dError(f"effects.elastic_object: not with a turned object; {advice}")
+            raise Finger3dError(
+                "effects.elastic_object: not with a turned object; take turn_x_deg, turn_y_deg and turn_z_deg out"
+            )
         deepest = max((leg.depth_mm for leg in model.legs if leg.force_N is None), default=0.0)
         if deepest > obj.held_height_mm:
-            deeper = f"deeper than the elastic object, which is held {obj.held_height_mm:g} mm above its lowest point"
-            advice = "press less deep, or take [effects.elastic_object] out"
-            raise Finger3dError(f"press.depth_mm = {deepest:g}: {deeper}; {advice}")
+            raise Finger3dError(
+                f"press.depth_mm = {deepest:g}: deeper than the elastic object, which is held {obj.held_height_mm:g} "
+                "mm above its lowest point; press less deep, or take [effects.elastic_object] out"
+            )
         soft = ElasticObject(self.E_MPa, self.nu, self.height_mm)
         model = fill(model, "object_compliance", soft, "elastic_object")
         if any(leg.moves_sideways for leg in model.legs):
-            moves = "the object's shape moves, its compliance stays that of where it was touched first"
-            model = warn(model, f"elastic_object: {moves}")
+            model = warn(
+                model,
+                "elastic_object: the object's shape moves, its compliance stays that of where it was touched first",
+            )
         return model

@@ -37,14 +37,19 @@ class Effect:
             if gauge.is_point:
                 raise Finger3dError(f"gauge.{i}.length_mm = 0.0: must be above 0 with {here}: a foil has a length")
             if f"{gauge.name}_free" in names:
-                taken = f'{here} gives this name to the free strain of "{gauge.name}"'
-                raise Finger3dError(f'gauge.name = "{gauge.name}_free": {taken}; choose another')
+                raise Finger3dError(
+                    f'gauge.name = "{gauge.name}_free": {here} gives this name to the free strain of "{gauge.name}"; '
+                    "choose another"
+                )
             room = 0.5 * model.design.width_mm - abs(gauge.z_mm)
             if 0.5 * self.width_mm > room:
-                what = f'gauge "{gauge.name}" would stick out of the finger'
-                allowed = f"must be at most {at_most(2.0 * room)} there"
-                raise Finger3dError(f"{here}.width_mm = {self.width_mm}: {what}; {allowed}")
+                raise Finger3dError(
+                    f'{here}.width_mm = {self.width_mm}: gauge "{gauge.name}" would stick out of the finger; '
+                    f"must be at most {at_most(2.0 * room)} there"
+                )
         if self.thickness_mm > model.mesh.size_mm:
-            allowed = f"must be at most mesh.size_mm = {model.mesh.size_mm}, or the mesh coarser"
-            raise Finger3dError(f"{here}.thickness_mm = {self.thickness_mm}: thicker than an element; {allowed}")
+            raise Finger3dError(
+                f"{here}.thickness_mm = {self.thickness_mm}: thicker than an element; must be at most mesh.size_mm = "
+                f"{model.mesh.size_mm}, or the mesh coarser"
+            )
         return fill(model, "inclusions", Foils(self.E_MPa, self.thickness_mm, self.width_mm), "embedded_gauge")

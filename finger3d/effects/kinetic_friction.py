@@ -33,6 +33,9 @@ class Effect:
             return fill(model, "friction", model.friction, "kinetic_friction")
         model = fill(model, "friction", TwoCoefficients(model.friction.mu, self.ratio, self.branch), "kinetic_friction")
         if self.branch == "paper":
-            depend = "its stick zone and friction depend on mesh and increments"
-            model = warn(model, f"kinetic_friction: branch 'paper' starts every increment all stuck; {depend}")
+            model = warn(
+                model,
+                "kinetic_friction: branch 'paper' starts every increment all stuck; its stick zone and friction depend "
+                "on mesh and increments",
+            )
         return model

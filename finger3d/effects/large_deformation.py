@@ -61,9 +61,10 @@ class Effect:
         for mode, strain in {} if law.is_stable else unstable_from(law).items():
             if abs(strain) < _LEAST_STABLE_STRAIN:
                 keys = " and ".join(f"{_TABLE}.{key}" for key in CONSTANTS[self.law])
-                falls = f"the stress falls from a nominal strain of {strain:.2g} in {mode}"
-                advice = "choose constants that are stable further"
-                raise Finger3dError(f"{keys}: with these constants {falls}; {advice}")
+                raise Finger3dError(
+                    f"{keys}: with these constants the stress falls from a nominal strain of {strain:.2g} in {mode}; "
+                    "choose constants that are stable further"
+                )
         return fill(model, "hyperelastic_law", law, "large_deformation")
 
     def isochoric_law(self) -> IsochoricLaw:

@@ -39,8 +39,10 @@ class Effect:
     def __post_init__(self) -> None:
         """Refuse a series whose long-time modulus is negative by more than the rounding of a data sheet."""
         if self._total > 1.0 + _ROUNDING:
-            allowed = "must be below 1, the rest is the long-time modulus"
-            raise Finger3dError(f"prony: the relative moduli sum to {self._total:.6g}; {allowed}")
+            raise Finger3dError(
+                f"prony: the relative moduli sum to {self._total:.6g}; must be below 1, the rest is the long-time "
+                "modulus"
+            )
 
     @property
     def _total(self) -> float:
@@ -52,9 +54,11 @@ class Effect:
         scale = min(most / self._total, 1.0)
         prony = tuple((share * scale, time) for share, time in self.prony)
         if scale < 1.0:
-            summed = f"the relative moduli sum to {self._total:.6g}, taken as rounded"
-            scaled = f"they are scaled to {most:g}, and almost nothing is left of E at long times"
-            model = warn(model, f"effects.viscosity.prony: {summed}: {scaled}")
+            model = warn(
+                model,
+                f"effects.viscosity.prony: the relative moduli sum to {self._total:.6g}, taken as rounded: they are "
+                f"scaled to {most:g}, and almost nothing is left of E at long times",
+            )
         relaxation = Relaxation(prony, self.bulk)
         model = fill(model, "relaxation", relaxation, "viscosity")
         timeless = [i for i, leg in enumerate(model.legs) if leg.duration_s is None]

@@ -80,9 +80,10 @@ def ports(base: CrossSection, options: MoldOptions) -> Ports:
             break
         pour *= 0.95
         if pour < min(_LEAST_POUR_MM, largest):
-            room = f"the base, {x1 - x0:.4g} x {z1 - z0:.4g} mm"
-            openings = f"vents of {vent_mm:.3g} mm and {options.rim_mm:g} mm between them"
-            raise Finger3dError(f"--pour-mm {pour_mm:.3g}: does not fit on {room}, with {openings}; must be smaller")
+            raise Finger3dError(
+                f"--pour-mm {pour_mm:.3g}: does not fit on the base, {x1 - x0:.4g} x {z1 - z0:.4g} mm, with vents of "
+                f"{vent_mm:.3g} mm and {options.rim_mm:g} mm between them; must be smaller"
+            )
     middle = nearest(allowed, (0.0, 0.0))
     room = min(math.dist(middle, v) - vent_mm / 2.0 - options.rim_mm for v in vents)
     # The funnel may be wider than the base, but must not cover a vent.
@@ -199,17 +200,20 @@ def check_foils(body: Body, foils: Sequence[FoilSlot], options: MoldOptions) -> 
     for (i, a), (j, b) in itertools.combinations(enumerate(slots), 2):
         apart = float(a.distance_to(b))
         if apart < options.rim_mm:
-            near = f'its slot is {apart:.3g} mm from that of gauge "{foils[i].names[0]}"'
-            must = f"must be {options.rim_mm:g} mm away or more; move one, or choose shorter foils"
-            raise Finger3dError(f'gauge "{foils[j].names[0]}": {near}, {must}')
+            raise Finger3dError(
+                f'gauge "{foils[j].names[0]}": its slot is {apart:.3g} mm from that of gauge "{foils[i].names[0]}", '
+                f"must be {options.rim_mm:g} mm away or more; move one, or choose shorter foils"
+            )
     for foil in foils:
         for z in foil.z_mm:
             ends = z * options.scale - foil.width_mm / 2.0, z * options.scale + foil.width_mm / 2.0
             room = strip_solid(foil, options.scale, COVER_MM, *ends)
             if body.shared(room) < (1.0 - _TOLERANCE) * room.volume:
-                size = f"{foil.length_mm:g} x {foil.width_mm:g} x {foil.thickness_mm:g} mm"
-                what = f"its foil, {size}, is not in the silicone with {COVER_MM:g} mm around it"
-                raise Finger3dError(f'gauge "{foil.names[0]}": {what}; move it inwards, or choose a shorter foil')
+                raise Finger3dError(
+                    f'gauge "{foil.names[0]}": its foil, {foil.length_mm:g} x {foil.width_mm:g} x '
+                    f"{foil.thickness_mm:g} mm, is not in the silicone with {COVER_MM:g} mm around it; move it "
+                    "inwards, or choose a shorter foil"
+                )
 
 
 def strips(foils: Sequence[FoilSlot], layout: Layout, options: MoldOptions) -> Triangles | None:

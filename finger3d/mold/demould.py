@@ -55,9 +55,11 @@ def check_opening(finger: Body, options: MoldOptions, may_turn: bool) -> Undercu
     other = "x" if options.split == "z" else "z"
     free = (may_turn or other == "z") and undercut(finger, other, 0.0).depth_mm <= _LEAST_UNDERCUT_MM
     advice = f"--split {other} would do" if free else "a mold of two halves cannot be taken off; change the body"
-    given = f"--split {options.split} --split-mm {options.split_mm:g}"
-    advice += f", or --undercut-mm {_rounded_up(opening.depth_mm)} if the silicone can be stretched over it"
-    raise Finger3dError(f"{given}: {opening.where}, an undercut of {opening.depth_mm:.2g} mm; {advice}")
+    raise Finger3dError(
+        f"--split {options.split} --split-mm {options.split_mm:g}: {opening.where}, an undercut of "
+        f"{opening.depth_mm:.2g} mm; {advice}, or --undercut-mm {_rounded_up(opening.depth_mm)} if the silicone "
+        "can be stretched over it"
+    )
 
 
 def _rounded_up(depth: float) -> str:

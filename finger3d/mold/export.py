@@ -138,8 +138,9 @@ def export(
             files += written
             remarks += told
             silicone = assembly.silicone_mm3 / 1e3
-    volumes = _volume(design, solid, body), body.surface.volume
-    return Exported(tuple(files), *volumes, body.tolerance_mm, silicone, tuple(remarks))
+    return Exported(
+        tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
+    )
 
 
 def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> None:
@@ -148,8 +149,10 @@ def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> N
         require("export", "build123d")
     largest = _LARGEST_TOLERANCE * design.height_mm
     if not _LEAST_TOLERANCE_MM <= tolerance_mm <= largest:
-        allowed = f"from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, a fifth of the finger's height"
-        raise Finger3dError(f"--tolerance-mm {tolerance_mm}: must be {allowed}")
+        raise Finger3dError(
+            f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, "
+            "a fifth of the finger's height"
+        )
     if isinstance(design, Imported) and holds(out, ("finger.step", "finger.stl"), design.path):
         raise Finger3dError(f"--out {out}: holds {Path(design.path).name}, the finger's own file; name another folder")
 

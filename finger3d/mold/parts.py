@@ -105,8 +105,10 @@ def mold(
         for its openings, or for the reasons of `finger3d.mold.pours.pours`.
     """
     if options.split == "x" and gauges:
-        why = f'the strips of gauge "{gauges[0].names[0]}" run along z and would lock halves that open along x'
-        raise Finger3dError(f"--split x: {why}; use --split z, or a scene without gauges")
+        raise Finger3dError(
+            f'--split x: the strips of gauge "{gauges[0].names[0]}" run along z and would lock halves that open along '
+            "x; use --split z, or a scene without gauges"
+        )
     solids = solids or {}
     silicones = _silicones(shape, solids, rigid, options)
     finger = Body.of(shape, options.machine.tolerance_mm)
@@ -175,9 +177,10 @@ def filled(finger: Body, fillings: Sequence[Solid], options: MoldOptions) -> Bod
         depth = undercut_depth(Body.of(filling, tolerance).surface, 1, 1.0)
         if depth > max(options.undercut_mm, tolerance):
             center = ", ".join(f"{coordinate:.4g}" for coordinate in filling.center())
-            what = f"the recess in the base near ({center}) mm widens inside, an undercut of {depth:.2g} mm"
-            advice = "change the body, or allow it with --undercut-mm"
-            raise Finger3dError(f"mold: {what}: the lid, which fills it, cannot be pulled out; {advice}")
+            raise Finger3dError(
+                f"mold: the recess in the base near ({center}) mm widens inside, an undercut of {depth:.2g} mm: the "
+                "lid, which fills it, cannot be pulled out; change the body, or allow it with --undercut-mm"
+            )
     return Body.of(one(finger.solid.fuse(*fillings).clean(), "the finger"), tolerance) if fillings else finger
 
 
@@ -196,5 +199,7 @@ def check_split(finger: Body, options: MoldOptions) -> None:
     low, high = finger.box
     axis = 0 if options.split == "x" else 2
     if not low[axis] < options.split_mm < high[axis]:
-        allowed = f"must be between {low[axis]:.6g} and {high[axis]:.6g} mm along {options.split}"
-        raise Finger3dError(f"--split-mm {options.split_mm:g}: the split plane misses the finger; {allowed}")
+        raise Finger3dError(
+            f"--split-mm {options.split_mm:g}: the split plane misses the finger; must be between {low[axis]:.6g} and "
+            f"{high[axis]:.6g} mm along {options.split}"
+        )

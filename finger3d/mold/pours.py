@@ -94,8 +94,9 @@ def pour_order(solids: Mapping[str, Solid], rigid: Collection[str], options: Mol
         return sorted(soft, key=lambda label: -float(solids[label].center().Y))
     names = [name.strip() for name in options.pour_order.split(",")]
     if sorted(names) != sorted(label or MAIN for label in soft):
-        each = ", ".join(label or MAIN for label in soft)
-        raise Finger3dError(f"--pour-order {options.pour_order}: must name each once: {each}")
+        raise Finger3dError(
+            f"--pour-order {options.pour_order}: must name each once: {', '.join(label or MAIN for label in soft)}"
+        )
     return ["" if name == MAIN and MAIN not in soft else name for name in names]
 
 
@@ -158,8 +159,10 @@ def _positive(later: Sequence[Body], body: Body, options: MoldOptions, lid: str)
         raise Finger3dError(f"mold: {name} does not reach the lid; {advice}")
     depth = undercut_depth(surface, 1, 1.0)
     if depth > max(options.undercut_mm, options.machine.tolerance_mm):
-        what = f"{name} has an undercut of {depth:.2g} mm and cannot be pulled out of the silicone"
-        raise Finger3dError(f"mold: {what}; {advice}, or allow it with --undercut-mm")
+        raise Finger3dError(
+            f"mold: {name} has an undercut of {depth:.2g} mm and cannot be pulled out of the silicone; {advice}, or "
+            "allow it with --undercut-mm"
+        )
     return positive
 
 
@@ -189,8 +192,10 @@ def _channels(pour: Pour, layout: Layout) -> list[Solid]:
     boxes = [solid.bounding_box() for solid in pour.inside]
     low, high = np.min([[*box.min] for box in boxes], axis=0), np.max([[*box.max] for box in boxes], axis=0)
     wide = min(2.0, 0.1 * float(min(high[0] - low[0], high[2] - low[2])))
-    ends = float(low[0]) + _CHANNEL_INSET * wide, float(high[0]) - _CHANNEL_INSET * wide
-    return [cylinder((x, -LID_MM, layout.split), wide, float(high[1]) + LID_MM, "y") for x in ends]
+    return [
+        cylinder((x, -LID_MM, layout.split), wide, float(high[1]) + LID_MM, "y")
+        for x in (float(low[0]) + _CHANNEL_INSET * wide, float(high[0]) - _CHANNEL_INSET * wide)
+    ]
 
 
 def _on_pegs(label: str, insert: Body, body: Body, options: MoldOptions) -> tuple[list[Solid], Solid]:
@@ -206,8 +211,10 @@ def _on_pegs(label: str, insert: Body, body: Body, options: MoldOptions) -> tupl
     first, second = max((tuple(nearest(foot, end) for end in pair) for pair in ends), key=lambda pair: math.dist(*pair))
     room = not foot.is_empty() and math.dist(first, second) >= 2.0 * around
     if not (on_base and room and d >= 2.0 * thinnest and deep >= thinnest):
-        must = f"must stand on the base and be large enough for two pegs of {2.0 * thinnest:g} mm or more"
-        raise Finger3dError(f"[parts.{label}] rigid = true: it is an insert, which the lid holds; it {must}")
+        raise Finger3dError(
+            f"[parts.{label}] rigid = true: it is an insert, which the lid holds; it must stand on the base and be "
+            f"large enough for two pegs of {2.0 * thinnest:g} mm or more"
+        )
     places = [(px, 0.0, pz) for px, pz in (first, second)]
     made, sockets = pegs(places, d, deep, "y", options.gap_mm)
     return made, one(_clear_of_walls([insert], body, options) - sockets, label)
@@ -218,6 +225,7 @@ def check_strips(pours: Sequence[Pour], strips: Mapping[FoilSlot, Solid]) -> Non
     for foil, strip in strips.items():
         home = max(pours, key=lambda pour: pour.cast[-1].shared(strip))
         if any(common(strip, solid) > _SHARED_TOLERANCE * float(strip.volume) for solid in home.inside):
-            what = f"its strip runs through what {home.lid} brings into the cavity"
-            advice = "move it into one solid of silicone, clear of the others"
-            raise Finger3dError(f'gauge "{foil.names[0]}": {what}; {advice}')
+            raise Finger3dError(
+                f'gauge "{foil.names[0]}": its strip runs through what {home.lid} brings into the cavity; move it into '
+                "one solid of silicone, clear of the others"
+            )

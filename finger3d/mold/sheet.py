@@ -91,8 +91,9 @@ def _components(silicone: Silicone, volume_ml: float) -> list[str]:
     """Return the amount of each component; too much where the density is not known."""
     density = silicone.density_g_ml
     grams = volume_ml * (density or max(one.density_g_ml or 0.0 for one in silicones().values()))
-    unknown = "" if density else ", with the largest density of the table"
-    mixed = f"  weigh               {grams:.1f} g in all{unknown}"
+    mixed = f"  weigh               {grams:.1f} g in all" + (
+        "" if density else ", with the largest density of the table"
+    )
     if silicone.mix is None:
         return [f"{mixed}; mix ratio: {_SHEET}"]
     fraction_a = silicone.mix.share_a
@@ -147,8 +148,9 @@ def prepare_lines(mold: Mold) -> list[str]:
     if mold.pours[-1].inserts:
         lines[0] = lines[0].replace("touches with", "touches, but not the inserts, with")
     if (bolts := mold.bolts) is not None:
-        nuts, deep = f"{bolts.number} {mold.options.screw} nuts", f"{bolts.trap_mm:.3g} mm deep"
-        lines.append(f"Push {nuts} into the traps of half A, {deep}.")
+        lines.append(
+            f"Push {bolts.number} {mold.options.screw} nuts into the traps of half A, {bolts.trap_mm:.3g} mm deep."
+        )
     if mold.foils:
         lines.append("Thread the strips of the gauges through half B and then through half A.")
     return lines
@@ -265,9 +267,11 @@ def _gauge_lines(mold: Mold) -> list[str]:
     for foil in mold.foils:
         for name, z in zip(foil.names, foil.z_mm, strict=True):
             x, y, degrees = foil.x_mm * scale, foil.y_mm * scale, np.degrees(foil.angle)
-            size = f"foil {foil.length_mm:g} x {foil.width_mm:g} x {foil.thickness_mm:g}, z {z * scale - low:.4g}"
-            opening = f"slot {foil.length_mm + gap:.4g} x {foil.thickness_mm + gap:.4g}"
-            lines.append(f"  {name:<10} x {x:.4g}, y {y:.4g}, at {degrees:.4g} deg; {size}; {opening}")
+            lines.append(
+                f"  {name:<10} x {x:.4g}, y {y:.4g}, at {degrees:.4g} deg; "
+                f"foil {foil.length_mm:g} x {foil.width_mm:g} x {foil.thickness_mm:g}, z {z * scale - low:.4g}; "
+                f"slot {foil.length_mm + gap:.4g} x {foil.thickness_mm + gap:.4g}"
+            )
     return lines
 
 

@@ -120,8 +120,9 @@ class Cylinder(Prism):
         across = down - along * self.direction
         rim = np.linalg.norm(across)
         side = across * (self.radius_mm / rim if rim > _LEVEL else 0.0)
-        end = math.copysign(0.5 * self.length_mm, along) * self.direction
-        return np.asarray([0.0, self.radius_mm, 0.0] + side + end)
+        return np.asarray(
+            [0.0, self.radius_mm, 0.0] + side + math.copysign(0.5 * self.length_mm, along) * self.direction
+        )
 
     @property
     def detail(self) -> Detail:
@@ -358,8 +359,11 @@ def _circle_distance(r: Float, y: Float, radius: float) -> tuple[Float, Float, F
     divisor = np.where(regular, length, 1.0)
     # length - radius would lose the digits of points near a large circle
     total = np.where(length + radius > 0.0, length + radius, 1.0)
-    value = (r**2 + y**2 - 2.0 * y * radius) / total
-    return value, np.where(regular, r / divisor, 0.0), np.where(regular, out / divisor, -1.0)
+    return (
+        (r**2 + y**2 - 2.0 * y * radius) / total,
+        np.where(regular, r / divisor, 0.0),
+        np.where(regular, out / divisor, -1.0),
+    )
 
 
 def _lowest_of_sphere(turned: Float, radius: float) -> Float:

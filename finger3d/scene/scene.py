@@ -146,8 +146,10 @@ class Scene:
             If it is still open which of them are on.
         """
         if self.auto:
-            advice = "take the scene.toml that finger3d press writes"
-            raise Finger3dError(f"effects.auto = true: a press finds which effects this scene calls for; {advice}")
+            raise Finger3dError(
+                "effects.auto = true: a press finds which effects this scene calls for; take the scene.toml that "
+                "finger3d press writes"
+            )
         return self._model
 
     @cached_property

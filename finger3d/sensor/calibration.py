@@ -45,9 +45,10 @@ class Calibration(SensorModel):
     def __post_init__(self) -> None:
         """Raise an error if there are too few points."""
         if len(self.mu) < FEWEST:
-            found = f"only {len(self.mu)} of {len(self.mu) + len(self.failed)} values of mu converged"
-            first = self.failed[0][1] if self.failed else "none"
-            raise MissingError(f"calibrate: {found}, {FEWEST} are needed; first failure: {first}")
+            raise MissingError(
+                f"calibrate: only {len(self.mu)} of {len(self.mu) + len(self.failed)} values of mu converged, {FEWEST} "
+                f"are needed; first failure: {self.failed[0][1] if self.failed else 'none'}"
+            )
 
     @property
     def title(self) -> str:

@@ -72,9 +72,10 @@ def _named(calibration: Calibration, readings: ArrayLike | Mapping[str, ArrayLik
     if not isinstance(readings, Mapping) and len(calibration.names) == 1:
         return {calibration.names[0]: readings}
     if not isinstance(readings, Mapping) or not readings:
-        needed = f"every reading needs its name, for instance {calibration.names[0]}=0.05"
-        names = ", ".join(calibration.names)
-        raise Finger3dError(f"a reading without a name: {names} are calibrated, so that {needed}")
+        raise Finger3dError(
+            f"a reading without a name: {', '.join(calibration.names)} are calibrated, so that every reading needs its "
+            f"name, for instance {calibration.names[0]}=0.05"
+        )
     for name in readings:
         calibration[name]  # an unknown name raises an error
     return readings
@@ -141,8 +142,10 @@ def named_numbers(
         if name and name not in names:
             raise Finger3dError(f"{option} {text}: {name} is not calibrated; calibrated: {', '.join(names)}")
         if not name and not alike:
-            advice = f"give the name of the reading, for instance {option} {names[0]}={text}"
-            raise Finger3dError(f"{option} {text}: {', '.join(names)} are calibrated; {advice}")
+            raise Finger3dError(
+                f"{option} {text}: {', '.join(names)} are calibrated; give the name of the reading, for instance "
+                f"{option} {names[0]}={text}"
+            )
         for one in (name,) if name else names:
             if one in numbers:
                 raise Finger3dError(f"{option} {text}: {one} is given twice")
@@ -238,8 +241,10 @@ class Estimator:
         missing = [" or ".join(dict.fromkeys(self._column_names[n])) for n in self.calibration.names if n not in there]
         if missing:
             has = ", ".join(repr(name)[:40] for name in table.names) or "no line of names"
-            needed = f"a column named {' and one named '.join(missing)} and at least one reading"
-            raise Finger3dError(f"{table.source}: must have {needed}; it has {has}")
+            raise Finger3dError(
+                f"{table.source}: must have a column named {' and one named '.join(missing)} and at least one reading; "
+                f"it has {has}"
+            )
 
     def _readings_in(self, table: CsvTable) -> tuple[dict[str, Float], dict[str, Float]]:
         """Return the readings, and those of their standard deviations that the file has, by name."""

@@ -38,9 +38,10 @@ class Relaxation:
         Finger3dError
         """
         if domain == "plane-stress" and not self.bulk:
-            why = "not in plane stress, where the thickness follows neither modulus alone"
-            advice = 'set bulk = true, or model.domain = "plane-strain" or "solid"'
-            raise Finger3dError(f"effects.viscosity.bulk = false: {why}; {advice}")
+            raise Finger3dError(
+                "effects.viscosity.bulk = false: not in plane stress, where the thickness follows neither modulus "
+                'alone; set bulk = true, or model.domain = "plane-strain" or "solid"'
+            )
 
 
 @dataclass(frozen=True)
