@@ -107,13 +107,16 @@ def _is_binary(content: bytes) -> bool:
 def _binary_stl(path: Path, content: bytes) -> Float:
     """Return the corners (3 m, 3) of m triangles, one triangle after the other."""
     if len(content) < _STL_HEADER:
-        has = f"it has {len(content)} bytes, and does not begin with 'solid'"
-        raise Finger3dError(f"{path}: this is no STL file: {has}")
+        raise Finger3dError(
+            f"{path}: this is no STL file: it has {len(content)} bytes, and does not begin with 'solid'"
+        )
     count = int.from_bytes(content[_STL_COUNT], "little")
     held = (len(content) - _STL_HEADER) // _STL_FACET.itemsize
     if held < count:
-        what = f"the header of this binary STL file announces {count} triangles, and {held} follow"
-        raise Finger3dError(f"{path}: {what}: it was cut off, or is no STL file; copy or export it again")
+        raise Finger3dError(
+            f"{path}: the header of this binary STL file announces {count} triangles, and {held} follow: it was cut "
+            "off, or is no STL file; copy or export it again"
+        )
     _check_triangles(path, count)
     return np.frombuffer(content, _STL_FACET, count, _STL_HEADER)["corners"].reshape(-1, 3).astype(float)
 
@@ -122,8 +125,10 @@ def _text_stl(path: Path, content: bytes) -> Float:
     """Return the corners (3 m, 3) of the triangles of all solids, which together make one body."""
     count, vertices = (len(re.findall(rb"(?im)^\s*" + word, content)) for word in (rb"end\s*facet", rb"vertex\s"))
     if vertices != 3 * count:
-        what = f"this STL text has {count} whole facets and {vertices} vertices, where a facet has three"
-        raise Finger3dError(f"{path}: {what}: it was cut off or damaged; export it again")
+        raise Finger3dError(
+            f"{path}: this STL text has {count} whole facets and {vertices} vertices, where a facet has three: it was "
+            "cut off or damaged; export it again"
+        )
     if not re.search(rb"(?im)^\s*end\s*solid[^\n]*\s*\Z", content):
         raise Finger3dError(f"{path}: this STL text does not end with 'endsolid': it was cut off; export it again")
     _check_triangles(path, count)
@@ -140,8 +145,10 @@ def _check_triangles(path: Path, count: int) -> None:
     if not count:
         raise Finger3dError(f"{path}: this STL file holds no triangles")
     if count > MOST_TRIANGLES:
-        why = "triangles much smaller than mesh.size_mm do not change the mesh; export it coarser, or simplify it"
-        raise Finger3dError(f"{path}: {count} triangles; must be at most {MOST_TRIANGLES}: {why}")
+        raise Finger3dError(
+            f"{path}: {count} triangles; must be at most {MOST_TRIANGLES}: triangles much smaller than "
+            "mesh.size_mm do not change the mesh; export it coarser, or simplify it"
+        )
 
 
 def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
@@ -213,8 +220,10 @@ def read_step(path: Path) -> StepBody:
     try:
         read = in_child(_step.read, _STEP_S + _STEP_S_PER_BYTE * size, path=str(path.resolve()))
     except ChildError as error:
-        why = f"OpenCASCADE {error} on this STEP file, which is damaged or too complex"
-        raise Finger3dError(f"{path}: {why}; export it again where it was drawn") from None
+        raise Finger3dError(
+            f"{path}: OpenCASCADE {error} on this STEP file, which is damaged or too complex; export it again where it "
+            "was drawn"
+        ) from None
     if read["error"]:
         raise Finger3dError(f"{path}: {read['error']}")
     shape = TopoDS_Shape()

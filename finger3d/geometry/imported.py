@@ -98,8 +98,10 @@ class FileDesign(Design):
 def check_size(path: object, size: Float, unit: str) -> None:
     """Raise a Finger3dError for a body of a size (3,) that is too small or too large; it asks for the unit."""
     if not SMALLEST_MM <= float(np.linalg.norm(size)) <= LARGEST_MM:
-        allowed = f"a diagonal of {SMALLEST_MM:g} to {LARGEST_MM:g} mm"
-        raise Finger3dError(f"{path}: the body is {in_mm(*size)} large, allowed: {allowed}; {unit}")
+        raise Finger3dError(
+            f"{path}: the body is {in_mm(*size)} large, allowed: a diagonal of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; "
+            f"{unit}"
+        )
 
 
 def extent(design: Design) -> str:
@@ -287,8 +289,9 @@ def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:
     check_gaps(glue({label: Compound(found) for label, found in parts.items()}, str(path)), read.solids, str(path))
     whole = read.solids[0].fuse(*read.solids[1:]).clean().solids()
     if len(whole) != 1:
-        made = f"the {len(read.solids)} solids make {len(whole)} bodies"
-        raise Finger3dError(f"{path}: {made}: {apart(*whole[:2])}; give one body")
+        raise Finger3dError(
+            f"{path}: the {len(read.solids)} solids make {len(whole)} bodies: {apart(*whole[:2])}; give one body"
+        )
     return whole[0], parts if len(parts) > 1 else {}
 
 
@@ -324,8 +327,9 @@ def _on_its_base(
         solid = solid.moved(Location(tuple(float(-m) for m in middle)))
     moved = Triangles(points, surface.faces)
     if not (moved.normals[~base, 1] > 1e-3).any():
-        hint = 'is it drawn with y up? A finger with z up takes up = "z"'
-        raise Finger3dError(f"{path}: nothing of the body looks up; {hint}")
+        raise Finger3dError(
+            f'{path}: nothing of the body looks up; is it drawn with y up? A finger with z up takes up = "z"'
+        )
     return Imported(path, digest, scale, upside_down, False, middle, moved, solid)
 
 
@@ -334,8 +338,9 @@ def _turn(path: Path, solid: Solid, base: list[Face]) -> Callable[[Solid], Solid
     normals = np.array([[*face.normal_at(face.center())] for face in base])
     out = normals[0]
     if not all(face.is_planar for face in base) or (normals @ out).min() < _DOWNWARD:
-        named = f"the {len(base)} faces named '{_BASE_NAME}'"
-        raise Finger3dError(f"{path}: {named} are not one plane; name one plane face so")
+        raise Finger3dError(
+            f"{path}: the {len(base)} faces named '{_BASE_NAME}' are not one plane; name one plane face so"
+        )
 
     def turned(shape: Solid) -> Solid:
         if out[1] <= -_DOWNWARD:
@@ -349,8 +354,10 @@ def _turn(path: Path, solid: Solid, base: list[Face]) -> Callable[[Solid], Solid
     surface = tessellated(turned(solid))
     level = -out @ np.array([*base[0].center()])
     if abs(surface.low[1] - level) > _BASE_FLATNESS * surface.size:
-        reach = f"the body reaches {level - surface.low[1]:.4g} mm beyond the face named '{_BASE_NAME}'"
-        raise Finger3dError(f"{path}: {reach}; the base must be its outermost plane")
+        raise Finger3dError(
+            f"{path}: the body reaches {level - surface.low[1]:.4g} mm beyond the face named '{_BASE_NAME}'; the base "
+            "must be its outermost plane"
+        )
     return turned
 
 
@@ -361,7 +368,9 @@ def _base(path: str, surface: Triangles, which: str) -> NDArray[np.bool_]:
     area = float(np.linalg.norm(surface.area_vectors[base], axis=1).sum())
     footprint = float(np.maximum(-surface.area_vectors[:, 1], 0.0).sum())
     if area < _LEAST_BASE_SHARE * footprint:
-        seen = f"(area {area:.3g} of {footprint:.3g} mm2 seen from there)"
-        advice = 'draw it with y up and a flat base (a finger drawn with z up takes up = "z")'
-        raise Finger3dError(f"{path}: no base: the {which} point of the body lies on no level plane {seen}; {advice}")
+        raise Finger3dError(
+            f"{path}: no base: the {which} point of the body lies on no level plane (area {area:.3g} of "
+            f"{footprint:.3g} mm2 seen from there); draw it with y up and a flat "
+            'base (a finger drawn with z up takes up = "z")'
+        )
     return base

@@ -166,11 +166,14 @@ def _labelled(path: Path, contents: MeshContents) -> Mesh:
     if missing:
         names = ", ".join(f"'{name}'" for name in np.unique(contents.label)) or "none"
         how = "physical surface" if path.suffix.lower() == ".msh" else "value of the cell data 'label'"
-        advice = "name the facets of the fixed base 'base' and the facets that may touch first 'contact'"
-        raise Finger3dError(f"{path}: no facets are named '{missing[0]}' (a {how}); named are: {names}; {advice}")
+        raise Finger3dError(
+            f"{path}: no facets are named '{missing[0]}' (a {how}); named are: {names}; name the facets of the fixed "
+            "base 'base' and the facets that may touch first 'contact'"
+        )
     if cuts := [name for name in _CUTS if name in contents.label]:
-        but = "but symmetry is not used with a mesh; give the whole finger"
-        raise Finger3dError(f"{path}: facets are named '{cuts[0]}', {but}")
+        raise Finger3dError(
+            f"{path}: facets are named '{cuts[0]}', but symmetry is not used with a mesh; give the whole finger"
+        )
     corners = contents.cells[:, :4]
     used, cells = np.unique(corners, return_inverse=True)
     cells = cells.reshape(corners.shape)
@@ -201,8 +204,10 @@ def _labels(path: Path, contents: MeshContents, named: Int, boundary: Int) -> np
             continue
         facet = number.get(tuple(named[k].tolist()))
         if facet is None:
-            what = f"facet {k + 1} of those with a name, '{name}', lies on no outer face of a tetrahedron"
-            raise Finger3dError(f"{path}: {what}; name facets of the surface, and merge nodes at the same place")
+            raise Finger3dError(
+                f"{path}: facet {k + 1} of those with a name, '{name}', lies on no outer face of a tetrahedron; name "
+                "facets of the surface, and merge nodes at the same place"
+            )
         if taken.setdefault(facet, name) != name:
             raise Finger3dError(f"{path}: a facet is named both '{taken[facet]}' and '{name}'; give it one name")
         label[facet] = name
@@ -229,9 +234,10 @@ def _check_cells(path: Path, mesh: Mesh) -> None:
         bad = np.flatnonzero(~(determinants > 0.0))
         if len(bad):
             place = mesh.points[mesh.cells[bad[0], :4]].mean(axis=0)
-            first = f"number {bad[0] + 1}, near ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g})"
-            share = f"{len(bad)} of {len(mesh.cells)} tetrahedra"
-            raise Finger3dError(f"{path}: {share} are {what}, the first is {first}; mend the mesh where it was made")
+            raise Finger3dError(
+                f"{path}: {len(bad)} of {len(mesh.cells)} tetrahedra are {what}, the first is number {bad[0] + 1}, "
+                f"near ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}); mend the mesh where it was made"
+            )
 
 
 def _check_connected(path: Path, mesh: Mesh) -> None:
@@ -242,8 +248,10 @@ def _check_connected(path: Path, mesh: Mesh) -> None:
     cell, face = np.repeat(np.arange(count), 4), count + number.reshape(-1)
     bodies = int(connected(int(face.max()) + 1, cell, face).max()) + 1
     if bodies > 1:
-        advice = "mesh them as one, with common nodes where they meet (in Gmsh: fragment the volumes)"
-        raise Finger3dError(f"{path}: the tetrahedra are {bodies} bodies that share no facets; {advice}")
+        raise Finger3dError(
+            f"{path}: the tetrahedra are {bodies} bodies that share no facets; mesh them as one, with common nodes "
+            "where they meet (in Gmsh: fragment the volumes)"
+        )
 
 
 def _on_its_base(path: Path, mesh: Mesh) -> Mesh:
@@ -255,11 +263,15 @@ def _on_its_base(path: Path, mesh: Mesh) -> Mesh:
     level = mesh.points[nodes, 1]
     y0, y1 = float(level.min()), float(level.max())
     if y1 - y0 > _LEVEL * size:
-        reach = f"the facets named 'base' are no level plane, but reach from y = {y0:.6g} to {y1:.6g} mm"
-        raise Finger3dError(f"{path}: {reach}; turn the mesh so that y is up, and name only its plane base so")
+        raise Finger3dError(
+            f"{path}: the facets named 'base' are no level plane, but reach from y = {y0:.6g} to {y1:.6g} mm; turn "
+            "the mesh so that y is up, and name only its plane base so"
+        )
     if low[1] < y0 - _LEVEL * size:
-        reach = f"the body reaches {y0 - low[1]:.4g} mm below the facets named 'base'"
-        raise Finger3dError(f"{path}: {reach}; the base must be its lowest plane, turn the mesh so that y is up")
+        raise Finger3dError(
+            f"{path}: the body reaches {y0 - low[1]:.4g} mm below the facets named 'base'; the base must be its lowest "
+            "plane, turn the mesh so that y is up"
+        )
     at = mesh.points[nodes]
     middle = 0.5 * (at.min(axis=0) + at.max(axis=0))
     middle = np.where(np.abs(middle) <= _LEVEL * size, 0.0, middle)  # a mesh that is in place keeps its numbers

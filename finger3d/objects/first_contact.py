@@ -144,19 +144,24 @@ def initial_contact(way: ContactPath, touch: FirstTouch | None = None) -> Initia
     touch = touch or first_touch(way)
     first_contact_mm, place = touch
     if first_contact_mm == math.inf:
-        what = "it extends downwards without end over the finger, which would start inside it"
-        advice = "change its turn_x_deg, turn_y_deg, turn_z_deg"
-        raise Finger3dError(f"object: as it is turned at the start, {what}; {advice}")
+        raise Finger3dError(
+            "object: as it is turned at the start, it extends downwards without end over the finger, which would start "
+            "inside it; change its turn_x_deg, turn_y_deg, turn_z_deg"
+        )
     if not math.isfinite(first_contact_mm):
-        above = f"above the finger (|x| <= {way.half_length_mm:g}, |z| <= {way.half_width_mm:g} mm)"
-        raise Finger3dError(f"object: no part of it is {above}, so that it never touches; change x_mm, z_mm")
+        raise Finger3dError(
+            f"object: no part of it is above the finger (|x| <= {way.half_length_mm:g}, |z| <= "
+            f"{way.half_width_mm:g} mm), so that it never touches; change x_mm, z_mm"
+        )
     _clear_of_base(way, first_contact_mm)
     if not way.object.is_flat:  # a plane has no end that could hang down
         deepest = max(pose.depth_mm for pose in way.poses)
         if first_contact_mm <= deepest:
-            below = f"{deepest - first_contact_mm:.4g} mm below the finger's base: it touches the base first"
-            what = f"at depth {deepest:g} mm its lowest point, beside the finger, is {below}"
-            raise Finger3dError(f"object: {what}; press less deep, or change x_mm, z_mm")
+            raise Finger3dError(
+                f"object: at depth {deepest:g} mm its lowest point, beside the finger, is "
+                f"{deepest - first_contact_mm:.4g} mm below the finger's base: it touches the base first; press less "
+                "deep, or change x_mm, z_mm"
+            )
         _stays_on_finger(way, first_contact_mm)
     zone = _box(way, touch)
     if not (way.object.is_flat or way.walls_touch):
@@ -180,9 +185,10 @@ def _clear_of_base(way: ContactPath, first_contact_mm: float) -> None:
             if (PlacedObject.of(way.object, first_contact_mm, between).distance(base)[0] < 0.0).any():
                 x, y, z = np.degrees(between.turns)
                 turned = f"turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z " if between.is_turned else ""
-                what = f"at a depth of {between.depth_mm:.4g} mm, the object reaches the finger's base, which is held"
-                advice = f"{'turn' if turned else 'incline'} it less, or press less deep"
-                raise Finger3dError(f"press: {turned}{what}; {advice}")
+                raise Finger3dError(
+                    f"press: {turned}at a depth of {between.depth_mm:.4g} mm, the object reaches the finger's base, "
+                    f"which is held; {'turn' if turned else 'incline'} it less, or press less deep"
+                )
         before = pose
 
 
@@ -193,9 +199,10 @@ def _stays_on_finger(way: ContactPath, first_contact_mm: float) -> None:
         turned = pose.is_turned and pose.depth_mm > 0.0 and pose not in way.by_force
         if turned and not (_overlap(way.top, way.object, points, first_contact_mm, pose) > 0.0).any():
             x, y, z = np.degrees(pose.turns)
-            at = f"turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z at a depth of {pose.depth_mm:.4g} mm"
-            what = "the object is nowhere inside the finger at rest and does not touch it"
-            raise Finger3dError(f"press: {at}, {what}; turn it less, or press deeper")
+            raise Finger3dError(
+                f"press: turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z at a depth of {pose.depth_mm:.4g} mm, "
+                "the object is nowhere inside the finger at rest and does not touch it; turn it less, or press deeper"
+            )
 
 
 def _box(way: ContactPath, touch: FirstTouch) -> tuple[float, float, float, float]:
@@ -218,8 +225,10 @@ def _box(way: ContactPath, touch: FirstTouch) -> tuple[float, float, float, floa
         inside |= _overlap(way.top, way.object, points, touch.height_mm, pose) > 0.0
     (x0, z0), (x1, z1) = (f(points[inside], axis=0) if inside.any() else place for f in (np.min, np.max))
     if x1 - x0 <= _NOTHING * way.half_length_mm or z1 - z0 < _NOTHING * way.half_width_mm:
-        only = f"only at x = {place[0]:.4g}, z = {place[1]:.4g} mm, over no area: an edge or a wall touches first"
-        raise Finger3dError(f"object: it touches the finger {only}; change x_mm, z_mm, or press deeper")
+        raise Finger3dError(
+            f"object: it touches the finger only at x = {place[0]:.4g}, z = {place[1]:.4g} mm, over no area: an edge "
+            "or a wall touches first; change x_mm, z_mm, or press deeper"
+        )
     return float(x0), float(x1), float(z0), float(z1)
 
 
@@ -239,9 +248,10 @@ def _not_a_wall(way: ContactPath, place: Float) -> None:
         points = np.stack([place, place + step, place - step], axis=1)
         here, beside, before = PlacedObject.of(way.object, 0.0).height(*points)
         if here - beside > _STEEP * reach or before - here > _STEEP * reach:
-            rim = f"the finger's rim at x = {place[0]:.4g}, z = {place[1]:.4g} mm"
-            what = "a flank that hangs down beside it: a wall touches first"
-            raise Finger3dError(f"object: it touches {rim} with {what}; change x_mm, z_mm")
+            raise Finger3dError(
+                f"object: it touches the finger's rim at x = {place[0]:.4g}, z = {place[1]:.4g} mm with a flank that "
+                "hangs down beside it: a wall touches first; change x_mm, z_mm"
+            )
 
 
 def _no_side(way: ContactPath, first_contact_mm: float) -> None:
@@ -262,8 +272,9 @@ def _no_side(way: ContactPath, first_contact_mm: float) -> None:
             now = np.maximum(_overlap(way.top, way.object, rim, first_contact_mm, between), 0.0)
             if over is not None and (jump := now - over - _STEEP * stride / count).max() > 0.02 * first_contact_mm:
                 x, z = rim[np.argmax(jump)]
-                near = f"near slide ({between.slide_x_mm:.4g}, {between.slide_z_mm:.4g}) mm"
-                what = f"a wall of it runs into the finger's side at x = {x:.4g}, z = {z:.4g} mm"
-                raise Finger3dError(f"object: {near} {what}; move it less, or change x_mm, z_mm")
+                raise Finger3dError(
+                    f"object: near slide ({between.slide_x_mm:.4g}, {between.slide_z_mm:.4g}) mm a wall of it runs "
+                    f"into the finger's side at x = {x:.4g}, z = {z:.4g} mm; move it less, or change x_mm, z_mm"
+                )
             over = now
         before = pose

@@ -425,9 +425,10 @@ def check_rows(legs: tuple[Leg, ...], free: Sequence[FreeKey], measured: Measure
     path = np.array([0.0, *(getattr(target, measured.index) for target in targets(legs))])
     _check_range(measured, max((f.high for f in free if f.key == OFFSET), default=0.0), path)
     if measured.index == "depth_mm" and measured.at[-1] < _SHORTEST * path[-1]:
-        last = f"{measured.path}: line {measured.lines[-1]}: depth_mm = {measured.at[-1]:g}"
-        hint = "are the depths in mm? if so, lower press.depth_mm"
-        raise Finger3dError(f"{last}: the path of the scene ends at {path[-1]:g}; {hint}")
+        raise Finger3dError(
+            f"{measured.path}: line {measured.lines[-1]}: depth_mm = {measured.at[-1]:g}: the path of the scene "
+            f"ends at {path[-1]:g}; are the depths in mm? if so, lower press.depth_mm"
+        )
 
 
 def moving_part(path: Float, measured: MeasuredPress) -> slice:
@@ -443,8 +444,10 @@ def moving_part(path: Float, measured: MeasuredPress) -> slice:
     if (moves[first:] <= 0.0).any():
         other = "step" if measured.index == "time_s" else "time_s or step"
         verb = "rise" if measured.direction > 0.0 else "fall"
-        what = f"{measured.index} does not {verb} throughout the path of the scene"
-        raise Finger3dError(f"{measured.path}: {what}; give {other} instead, or a scene of the measured leg only")
+        raise Finger3dError(
+            f"{measured.path}: {measured.index} does not {verb} throughout the path of the scene; give {other} "
+            "instead, or a scene of the measured leg only"
+        )
     return slice(first, None)
 
 

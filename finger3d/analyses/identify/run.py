@@ -122,14 +122,20 @@ def _of_press(folder: Path, found: Identification) -> list[Panel]:
     data = found.measured
     columns: Tree = {data.index: data.at}
     for name, values in data.columns.items():
-        columns |= {name: values, f"{name}_std": found.stds[name], f"{name}_simulated": found.simulated[name]}
+        columns |= {
+            name: values,
+            f"{name}_std": found.stds[name],
+            f"{name}_simulated": found.simulated[name],
+        }
     write_csv(folder / "identify.csv", columns)
     offset = dict(zip(found.keys, found.fitted.values, strict=True)).get(OFFSET, 0.0)
     part = moving_part(found.curve[data.index], data)
     curve = {name: values[part] for name, values in found.curve.items()}
-    drawn = data.index, data.at + float(offset), curve[data.index]
-    own = {n: (values, found.stds[n], found.simulated[n], curve[n]) for n, values in data.columns.items()}
-    return [Panel(name, *columns, *drawn) for name, columns in own.items()]
+    at = data.at + float(offset)
+    return [
+        Panel(n, values, found.stds[n], found.simulated[n], curve[n], data.index, at, curve[data.index])
+        for n, values in data.columns.items()
+    ]
 
 
 def _of_tests(folder: Path, found: Identification) -> list[Panel]:
@@ -149,8 +155,9 @@ def _of_tests(folder: Path, found: Identification) -> list[Panel]:
     for name, test in tests:
         at = np.linspace(min(1.0, test.stretch.min()), max(1.0, test.stretch.max()), _FINE)
         curve = nominal_stress(law, principal_stretches(test.mode, at))
-        stress = test.stress, found.stds[name], found.simulated[name]
-        panels.append(Panel(name, *stress, curve, "stretch", test.stretch, at))
+        panels.append(
+            Panel(name, test.stress, found.stds[name], found.simulated[name], curve, "stretch", test.stretch, at)
+        )
     return panels
 
 
@@ -250,11 +257,14 @@ def _check_told(keys: Sequence[FreeKey], data: MeasuredPress, tested: LawInTests
     """Raise an error for free keys of which the measurements tell nothing, and for more keys than measured values."""
     for free in keys:
         if free.key == OFFSET and data.columns and data.index != "depth_mm":
-            ordered = f"the rows of {data.path} are ordered by {data.index}, not by depth_mm"
-            raise Finger3dError(f"--free {OFFSET}: {ordered}")
+            raise Finger3dError(
+                f"--free {OFFSET}: the rows of {data.path} are ordered by {data.index}, not by depth_mm"
+            )
         if not data.columns and not tested.tells(free.key):
-            told = "Young's modulus and the constants of effects.large_deformation"
-            raise Finger3dError(f"--free {free.key}: material tests tell only {told}; give a press, too")
+            raise Finger3dError(
+                f"--free {free.key}: material tests tell only Young's modulus and the constants of "
+                "effects.large_deformation; give a press, too"
+            )
     count = data.count + sum(len(test.stress) for test in tested.tests.values())
     if count <= len(keys):
         path = next((test.path for test in tested.tests.values()), data.path)
@@ -421,8 +431,9 @@ def _fitted(emulator: Emulator, start: Float, report: Progress) -> Identificatio
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
     notes, ratio = [*fitted.untold, *missing, *tested.instability(values)], math.sqrt(reduced)
     if ratio > _MISFIT:
-        left = f"the residuals are {ratio:.2g} times their standard deviations"
-        notes.append(f"{left}: the scene does not explain the data")
+        notes.append(
+            f"the residuals are {ratio:.2g} times their standard deviations: the scene does not explain the data"
+        )
     return Identification(
         scene=simulation.scene(values),
         keys=tuple(f.key for f in simulation.free),

@@ -65,8 +65,10 @@ def new_mesh(
         points, tets = run_child(glued, field, netgen_limit_s(cells))
         return on_cad(points, tets, body, "netgen"), design.volume_mm3, cad_seconds
     except UnusableMeshError as error:  # the same again
-        what = f"netgen cannot mesh with size_mm = {options.size_mm:g}: {error}"
-        raise Finger3dError(f"{design.name}: {what}; try other sizes, or mesher = 'ftetwild'") from error
+        raise Finger3dError(
+            f"{design.name}: netgen cannot mesh with size_mm = {options.size_mm:g}: {error}; try other sizes, or "
+            "mesher = 'ftetwild'"
+        ) from error
 
 
 def size_points(field: Sizing) -> tuple[Float, Float]:

@@ -81,8 +81,10 @@ def new_mesh(
         except UnusableMeshError as error:
             reasons.append(str(error))
             report.say(f"this mesh will not do: {error}; meshing again")
-    failed = f"{ATTEMPTS} attempts to mesh with size_mm = {options.size_mm:g} failed, the last because {reasons[-1]}"
-    raise Finger3dError(f"{design.name}: {failed}; try other sizes, or mesher = 'swept'")
+    raise Finger3dError(
+        f"{design.name}: {ATTEMPTS} attempts to mesh with size_mm = {options.size_mm:g} failed, the last because "
+        f"{reasons[-1]}; try other sizes, or mesher = 'swept'"
+    )
 
 
 def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tessellation, float]:
@@ -114,9 +116,10 @@ def _within_layers(design: Design, glued: Glued, epsilon: float, diagonal: float
         thickness = 2.0 * glued.volumes_mm3[number] / area if area else math.inf
         epsilon = min(epsilon, _ENVELOPE_SHARE * thickness / diagonal)
         if epsilon < _ENVELOPE[0]:
-            least = at_least(_ENVELOPE[0] * diagonal / _ENVELOPE_SHARE, 3)
-            needs = f"mesh.mesher = 'ftetwild' needs at least {least} mm, or mesher = 'swept' or 'netgen'"
-            raise Finger3dError(f"{design.name}: the part '{label}' is {thickness:.3g} mm thin; {needs}")
+            raise Finger3dError(
+                f"{design.name}: the part '{label}' is {thickness:.3g} mm thin; mesh.mesher = 'ftetwild' needs at "
+                f"least {at_least(_ENVELOPE[0] * diagonal / _ENVELOPE_SHARE, 3)} mm, or mesher = 'swept' or 'netgen'"
+            )
     return epsilon
 
 
