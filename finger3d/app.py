@@ -15,12 +15,11 @@ from werkzeug.serving import BaseWSGIServer, make_server
 
 from finger3d._types import Array, Float, freeze_arrays
 from finger3d.accuracy.changes import changing_numbers, two_digits
-from finger3d.accuracy.model_error import Judgement, at_large_deformation
+from finger3d.accuracy.model_error import judged_large_deformation
 from finger3d.analyses.calibrate import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.contact.friction import STATUS_NAMES
-from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
 from finger3d.fem.recovery import displacement
 from finger3d.mechanics.discretise.problem import Problem
@@ -205,7 +204,7 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
 
 def _remark(problem: Problem, step: StepResult) -> str:
     """Return that presses are in small strain, and what large deformation would change at the end of one."""
-    (found,) = Judgement(problem.model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False).values()
+    found = judged_large_deformation(problem.model)
     changes = found.estimate.of_press(changing_numbers(problem, step)).changes
     names = [name for name in ("normal_force_N", "friction_sum_N", "stick_area_mm2") if name in changes]
     said = [

@@ -13,10 +13,9 @@ import pytest
 import finger3d
 from finger3d.accuracy import model_error as module
 from finger3d.accuracy.changes import Change, ChangeEstimate, changing_numbers, natural_scales
-from finger3d.accuracy.model_error import Judged, Judgement, advise, at_large_deformation, largest_principal_strain
+from finger3d.accuracy.model_error import advise, judged_large_deformation, largest_principal_strain
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
-from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
@@ -31,15 +30,10 @@ from tests.scenes import HALF_CYLINDER, changed, words, written
 COARSE = 0.3
 
 
-def large_deformation(model: Model, shortcut: bool = False) -> Judged:
-    (found,) = Judgement(model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut).values()
-    return found
-
-
 def test_the_change_by_large_deformation_is_that_of_the_press_at_large_deformation() -> None:
     model = half_cylinder(COARSE)
     own = changing_numbers(*ended(model))
-    found = large_deformation(model)
+    found = judged_large_deformation(model)
     estimate = found.estimate.of_press(own)
     truth = changing_numbers(*ended(LargeDeformation().apply(model)))
     assert found.used
@@ -60,7 +54,7 @@ def test_the_interval_of_a_number_that_no_coarse_mesh_resolves_holds() -> None:
         object=Sphere(radius_mm=10.0), friction=Coulomb(0.106), gauges=(Gauge("b", 0.0, 7.0),),
     )  # fmt: skip
     own = changing_numbers(*ended(model))
-    estimate = large_deformation(model).estimate.of_press(own)
+    estimate = judged_large_deformation(model).estimate.of_press(own)
     truth = changing_numbers(*ended(LargeDeformation().apply(model)))
     for name in ("gauge_b", "normal_force_N"):
         change = estimate.changes[name]
@@ -84,9 +78,9 @@ def test_the_strain_decides_where_a_press_at_large_deformation_fails(monkeypatch
     deep, shallow = half_cylinder(COARSE), replace(half_cylinder(COARSE), legs=(Leg(0.02, steps=4),))
     truth, own = (changing_numbers(*ended(one)) for one in (LargeDeformation().apply(deep), deep))
     failing(monkeypatch, lambda model: model.finite_strain)
-    assert large_deformation(deep).used
-    assert not large_deformation(shallow).used
-    for name, change in large_deformation(deep).estimate.changes.items():
+    assert judged_large_deformation(deep).used
+    assert not judged_large_deformation(shallow).used
+    for name, change in judged_large_deformation(deep).estimate.changes.items():
         assert change.low <= truth[name] - own[name] <= change.high
 
 

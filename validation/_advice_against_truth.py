@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.accuracy.changes import Change, changing_numbers
-from finger3d.accuracy.model_error import Judgement, at_large_deformation, largest_principal_strain
-from finger3d.effects import LARGE_DEFORMATION
+from finger3d.accuracy.model_error import judged_large_deformation, largest_principal_strain
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
@@ -110,7 +109,7 @@ def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
     strain = formulation_of(problem.model).fields(problem, step.meshed_state)[1]
     if largest_principal_strain(strain) < LEAST_STRAIN:
         return
-    (found,) = Judgement(model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False).values()
+    found = judged_large_deformation(model)
     estimate = found.estimate.of_press(changing_numbers(problem, step))
     truth = build(LargeDeformation().apply(model))
     *_, end = march(truth)

@@ -16,7 +16,20 @@ import numpy as np
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, draw_grid, fig9, line, rows_by_mu, said, strains
+from ._paper import (
+    BELOW_FIG9,
+    INCREMENTS,
+    MUS,
+    STRAIN,
+    STRESS,
+    Profile,
+    draw_grid,
+    fig9,
+    line,
+    rows_by_mu,
+    said,
+    strains,
+)
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns, listed
 from .fig9_strains import ANGLES, gauges, statements
@@ -25,7 +38,7 @@ judged = listed(__file__)
 
 SOLID = "solid"
 PLANES = (SOLID, STRAIN, STRESS)
-STEPS = {SOLID: 40, STRAIN: 320, STRESS: 320}
+STEPS = {SOLID: 40, STRAIN: INCREMENTS, STRESS: INCREMENTS}
 
 
 def run(quick: bool) -> Result:

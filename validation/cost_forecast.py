@@ -26,10 +26,9 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import estimate, press_numbers
-from finger3d.accuracy.model_error import Judgement, at_large_deformation
+from finger3d.accuracy.model_error import judged_large_deformation
 from finger3d.analyses.cost import CostRow, Forecasts
 from finger3d.analyses.pressed_body import PressedBody
-from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.march.step_halving import march_automatic, with_increments_of
@@ -94,7 +93,7 @@ class _Pressed:
         steps, chosen = march_automatic(problem)
         self.bars = estimate(problem, steps, numbers=press_numbers, chosen=chosen)
         if not model.finite_strain:  # a press says what large deformation would change
-            Judgement(problem.model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False)
+            judged_large_deformation(problem.model)
         self.seconds = time.perf_counter() - start - problem.seconds["cad"] - problem.seconds["mesh"]
         self.dofs, self.increments = problem.size.dofs, len(steps)
         self.numbers, self._kinds = press_numbers(problem, steps[-1]), kinds_of(steps[-1].readings)

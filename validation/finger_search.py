@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, Profile, fig9, line, pressed, said, strains
+from ._paper import BELOW_FIG9, INCREMENTS, MUS, STRAIN, Profile, fig9, line, pressed, said, strains
 from ._press import fig9_finger, under
 from ._rows import Result, Row, at_most, columns, together
 
@@ -104,7 +104,7 @@ DOMAINS = {STRAIN: "plane strain", "solid": "20 mm wide"}
 GAUGE = (36.0, 30.0)
 ANGLES = np.arange(0.0, 91.0, 5.0)
 SIZES = {STRAIN: 1.0, "solid": 2.0}
-STEPS = {STRAIN: (320, 160), "solid": (80, 40)}  # increments; half as many give the error
+STEPS = {STRAIN: (INCREMENTS, INCREMENTS // 2), "solid": (80, 40)}  # increments; half as many give the error
 OTHERS = {STRAIN: (0.5, 2.0), "solid": (1.5, 3.0)}
 RANGES = {"mu = .06 to 1": len(MUS), "mu = .06 to .5": MUS.index(0.5) + 1}
 _HEIGHT = 49.9  # mm, the paper's finger is 50 mm high

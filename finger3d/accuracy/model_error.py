@@ -328,6 +328,16 @@ class Judgement:
         return Judged(used, ChangeEstimate(changes=changes, method=method), why, number, relative)
 
 
+def judged_large_deformation(model: Model, shortcut: bool = False) -> Judged:
+    """Return what large deformation would change in a press in small strain, with its error.
+
+    Parameters
+    ----------
+    shortcut : as in `Judgement.found`
+    """
+    return Judgement(model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut)[LARGE_DEFORMATION]
+
+
 @dataclass(frozen=True)
 class _Press:
     """Numbers at the end of a press with their natural scales, resolution of its lengths and areas, nodal strain."""

@@ -334,11 +334,11 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
     if record.need:
         record.model_error = record.need.changes(numbers)
     elif not problem.model.finite_strain:
-        from finger3d.accuracy.model_error import Judgement, at_large_deformation
+        from finger3d.accuracy.model_error import judged_large_deformation
         from finger3d.effects import LARGE_DEFORMATION
 
         report.stage("estimating what large deformation would change")
-        (judged,) = Judgement(problem.model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False).values()
+        judged = judged_large_deformation(problem.model)
         record.model_error = {LARGE_DEFORMATION: judged.estimate.of_press(numbers)}
     _advise(record)
 
