@@ -1,4 +1,4 @@
-"""Signals that interrupt a command: each raises one KeyboardInterrupt in the main thread, which cannot be lost."""
+"""Signals and standard descriptors of a command: a signal raises one KeyboardInterrupt, which cannot be lost."""
 
 from __future__ import annotations
 
@@ -82,3 +82,16 @@ def interruption_ends_process() -> None:
     for name in (signal.SIGINT, *_termination_signals()):
         if signal.getsignal(name) is not signal.SIG_IGN:
             signal.signal(name, end)
+
+
+def fill_descriptors() -> None:
+    """Open the null device for closed standard descriptors, which the next opened file would otherwise take."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            null = os.open(os.devnull, os.O_RDWR)
+            if null != number:
+                os.dup2(null, number)
+                os.close(null)
+            os.set_inheritable(number, True)

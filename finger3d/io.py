@@ -11,6 +11,7 @@ import json
 import math
 import os
 import secrets
+import tempfile
 import time
 import tokenize
 import zipfile
@@ -84,6 +85,28 @@ def atomic(path: str | Path) -> Iterator[Path]:
 def holds(folder: str | Path, names: Iterable[str], file: str | Path) -> bool:
     """Return whether a file is one of these in a folder, whatever links lead to it."""
     return os.path.realpath(file) in [os.path.realpath(Path(folder) / name) for name in names]
+
+
+def check_writable(out: Path, scene: Path) -> None:
+    """Raise Finger3dError if the output folder cannot be written, or holds the scene file itself."""
+    if holds(out, ["scene.toml"], scene):
+        raise Finger3dError(f"--out {out}: holds {scene.name}, which the results would overwrite; name another folder")
+    check_folder(out)
+
+
+def check_folder(out: Path) -> None:
+    """Raise Finger3dError if a folder cannot be written, or cannot be created where it does not exist."""
+    try:
+        # a link that leads nowhere, or in a circle, is there without existing
+        there = next(p for p in (out, *out.parents, Path()) if os.path.lexists(p))
+        if not there.exists():
+            raise Finger3dError(f"--out {out}: {there} is a link that leads nowhere; name another folder")
+        if there == out and not out.is_dir():
+            raise Finger3dError(f"--out {out}: is a file; name a folder")
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError as error:
+        raise Finger3dError(f"--out {out}: cannot be written: {error.strerror}") from None
 
 
 _TEMPORARY = ".finger3d-"

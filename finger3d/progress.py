@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 import time
 from types import TracebackType
 from typing import TextIO
 
 from finger3d._ranges import printable
+
+_LEAST_COLUMNS = 20
+"""Width below which cyclopts and rich break lines without end."""
 
 
 class Progress:
@@ -141,3 +145,11 @@ def reporter(stream: TextIO | None = None) -> Progress:
     unicode = (target.encoding or "utf-8").lower().startswith("utf")  # bar and spinner are not ASCII
     interactive = target.isatty() and unicode and os.environ.get("TERM") != "dumb" and not os.environ.get("CI")
     return BarProgress(stream) if interactive else PlainProgress(stream)
+
+
+def least_width() -> None:
+    """Let text be at least 20 columns wide on a terminal that says it is narrower."""
+    said = os.environ.get("COLUMNS", "")
+    width = int(said) if said.isdecimal() else shutil.get_terminal_size().columns
+    if width < _LEAST_COLUMNS:
+        os.environ["COLUMNS"] = str(_LEAST_COLUMNS)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.fem.hyperelastic import TotalLagrangian
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.base import Inhomogeneous
 from finger3d.fem.laws.invariants import InvariantLaw, _invariants
 from finger3d.fem.laws.ogden import _principal
-from finger3d.fem.solids.hyperelastic import TotalLagrangian
 from finger3d.fem.tensors import determinant
 
 

@@ -26,10 +26,10 @@ from finger3d.analyses.calculix import (
     press_deck,
 )
 from finger3d.cli import main
+from finger3d.fem.hyperelastic import Hyperelastic
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import FACETS, quadratic
-from finger3d.fem.solids.hyperelastic import Hyperelastic
 from finger3d.meshing.given import given_mesh
 from finger3d.meshing.mesh_files import write_mesh_vtu
 from finger3d.objects import Cylinder, MeshObject, ObjectPose, PlacedObject, Plane, RigidObject, Sphere, Wave, Wedge

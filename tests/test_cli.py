@@ -189,7 +189,7 @@ def test_results_are_written_whatever_becomes_of_the_terminal(root: Path, tmp_pa
 def test_a_closed_descriptor_is_not_given_to_a_file(root: Path, tmp_path: Path) -> None:
     """Else what a library prints to descriptor 1 would end up in a file of results."""
     code = (
-        "import os; from finger3d.cli.terminal import fill_descriptors\n"
+        "import os; from finger3d._interruption import fill_descriptors\n"
         "fill_descriptors(); file = open('data', 'w'); os.write(1, b'printed'); file.write(str(file.fileno()))"
     )
     env = {**os.environ, "PYTHONPATH": str(root)}

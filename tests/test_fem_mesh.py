@@ -13,6 +13,7 @@ from scipy.sparse.linalg import spsolve
 
 from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, stiffness
+from finger3d.fem.hyperelastic import Hyperelastic, TotalLagrangian, nodal_fields
 from finger3d.fem.laws import MooneyRivlin, NeoHooke
 from finger3d.fem.laws.material import Elasticity, ElasticityByPart, Isotropic, elasticity_of
 from finger3d.fem.mesh import (
@@ -38,7 +39,6 @@ from finger3d.fem.mesh import (
     unfold,
 )
 from finger3d.fem.recovery import strain_and_stress
-from finger3d.fem.solids.hyperelastic import Hyperelastic, TotalLagrangian, nodal_fields
 from tests.meshes import full, grid, points_in
 from validation._common import product_rule
 

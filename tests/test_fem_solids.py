@@ -12,11 +12,11 @@ from scipy.sparse.linalg import splu
 
 from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, stiffness
+from finger3d.fem.embedded import BarRelaxation, Bars, InfiniteBody
+from finger3d.fem.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian, stretch
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh import Mesh, quadratic
-from finger3d.fem.solids.embedded import BarRelaxation, Bars, InfiniteBody
-from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian, stretch
 from finger3d.fem.tensors import determinant
 from tests.energies import energy_of_body
 from tests.meshes import full, grid

@@ -20,7 +20,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 from finger3d.geometry.tessellate import tessellate, tessellate_parts
 from finger3d.mechanics.model import MeshOptions
-from finger3d.meshing import cache
+from finger3d.meshing import generate
 from finger3d.scene import parse
 from tests.bodies import box, step_of, write_stl
 from tests.designs import SMALL, make
@@ -231,7 +231,7 @@ def test_a_body_drawn_with_z_up_is_turned_about_x(tmp_path: Path) -> None:
     assert body.solid().bounding_box().max.Y == pytest.approx(SMALL.height_mm, abs=1e-9)
     assert body != imported(path)
     where = (options(1.0, 2.0), (-1.0, 1.0, -1.0, 1.0), ())
-    assert cache.key(body, *where) != cache.key(imported(path), *where)
+    assert generate.cache_key(body, *where) != generate.cache_key(imported(path), *where)
     # a face named base agrees with it
     based = imported(step_with_base(tmp_path / "base.step", lying, lying.faces().sort_by(Axis.Z)[0]), up="z")
     np.testing.assert_allclose(based.surface.high, body.surface.high, atol=1e-9)

@@ -14,11 +14,11 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.effects.large_deformation import Effect
 from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.hyperelastic import Hyperelastic
 from finger3d.fem.laws import NeoHooke, Yeoh
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import most_distorted
 from finger3d.fem.recovery import displacement
-from finger3d.fem.solids.hyperelastic import Hyperelastic
 from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build

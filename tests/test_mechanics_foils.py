@@ -18,9 +18,9 @@ from finger3d.cli import main
 from finger3d.contact.friction import Coulomb, TwoCoefficients
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.assembly import Stiffness
+from finger3d.fem.embedded import FoilPatches, InfiniteBody
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import CONTACT
-from finger3d.fem.solids.embedded import FoilPatches, InfiniteBody
 from finger3d.fem.solvers.condense import condense, stiffened
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build

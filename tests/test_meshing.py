@@ -25,7 +25,7 @@ from finger3d.geometry.design import designs
 from finger3d.geometry.faceted import body as faceted_body
 from finger3d.geometry.imported import imported
 from finger3d.mechanics.model import MeshOptions
-from finger3d.meshing import cache
+from finger3d.meshing import generate
 from finger3d.meshing.bisection import refined
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.limits import mesh_report
@@ -126,7 +126,7 @@ def stored(tmp_path: Path) -> tuple[Path, Mesh]:
     options = MeshOptions(size_mm=2.0, base_size_mm=4.0, mesher="swept", layers=2)
     mesh = mesh_solid(designs()["block"](5.0, 5.0, 5.0), options, (-1, 1, -1, 1))[0]
     path = tmp_path / "mesh.npz"
-    assert cache.save(path, mesh, 250.0)
+    assert generate.save_cached(path, mesh, 250.0)
     return path, mesh
 
 
@@ -143,9 +143,9 @@ def test_a_damaged_cache_file_is_not_trusted(stored: tuple[Path, Mesh], damage: 
         np.savez(path, **arrays)
     else:
         path.write_bytes(data[: len(data) // 2])
-    assert cache.load(path) is None
-    assert cache.save(path, mesh, 250.0)
-    assert cache.load(path) is not None
+    assert generate.load_cached(path) is None
+    assert generate.save_cached(path, mesh, 250.0)
+    assert generate.load_cached(path) is not None
 
 
 def test_a_cache_that_cannot_be_written_is_said_and_does_not_stop_the_work(
@@ -164,22 +164,22 @@ def test_the_key_knows_all_that_shapes_the_mesh() -> None:
     finer = MeshOptions(size_mm=4.0, base_size_mm=10.0)
     coarser = MeshOptions(size_mm=5.0, base_size_mm=12.0)
     keys = [
-        cache.key(FIG9, OPTIONS, ZONE, BOTH),
-        cache.key(other, OPTIONS, ZONE, BOTH),
-        cache.key(FIG9, finer, ZONE, BOTH),
-        cache.key(FIG9, coarser, ZONE, BOTH),
-        cache.key(FIG9, replace(OPTIONS, mesher="netgen"), ZONE, BOTH),
-        cache.key(FIG9, OPTIONS, (-30.0, 30.0, -10.0, 10.0), BOTH),
-        cache.key(FIG9, OPTIONS, ZONE, ("x",)),
+        generate.cache_key(FIG9, OPTIONS, ZONE, BOTH),
+        generate.cache_key(other, OPTIONS, ZONE, BOTH),
+        generate.cache_key(FIG9, finer, ZONE, BOTH),
+        generate.cache_key(FIG9, coarser, ZONE, BOTH),
+        generate.cache_key(FIG9, replace(OPTIONS, mesher="netgen"), ZONE, BOTH),
+        generate.cache_key(FIG9, OPTIONS, (-30.0, 30.0, -10.0, 10.0), BOTH),
+        generate.cache_key(FIG9, OPTIONS, ZONE, ("x",)),
     ]
     assert len(set(keys)) == len(keys)
-    assert cache.key(FIG9, OPTIONS, ZONE, ("z", "x")) == keys[0]
+    assert generate.cache_key(FIG9, OPTIONS, ZONE, ("z", "x")) == keys[0]
 
 
 def test_designs_typed_at_a_prompt_share_no_mesh() -> None:
     block = designs()["block"]
     typed = [type("Own", (block,), {"name": "own", "__module__": "typed at a prompt"}) for _ in range(2)]
-    first, second = (cache.key(own(5.0, 5.0, 5.0), OPTIONS, ZONE, BOTH) for own in typed)
+    first, second = (generate.cache_key(own(5.0, 5.0, 5.0), OPTIONS, ZONE, BOTH) for own in typed)
     assert first != second
 
 

@@ -11,10 +11,10 @@ from cyclopts import App, Parameter
 
 from finger3d import cli
 from finger3d.cli.common import job
-from finger3d.cli.folders import check_folder
 from finger3d.cli.options import Json
 from finger3d.cli.printing import print_columns, print_json
 from finger3d.errors import MissingError
+from finger3d.io import check_folder
 
 from . import _runner
 from ._rows import settled, table

@@ -25,9 +25,9 @@ from scipy.signal import residue
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.fem.embedded import AddedStiffness
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
-from finger3d.fem.solids.embedded import AddedStiffness
 from finger3d.fem.surface import BoundarySurface
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg

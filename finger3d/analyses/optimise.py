@@ -34,7 +34,7 @@ from finger3d.plotting.analyses import draw_optimisation
 from finger3d.progress import QUIET, Progress
 from finger3d.report.analyses import optimise_page
 from finger3d.results.journal import Journal, Row, number_in, opened
-from finger3d.scene import Scene, Source, files, parse, tree
+from finger3d.scene import Scene, Source, parse, tree
 from finger3d.sensor.curve import LARGEST_STRAIN
 
 MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
@@ -87,7 +87,7 @@ class OptimisationProblem:
         """Return what two runs must have in common to continue each other's evaluations; the budget may differ."""
         return {
             "scene": tree.plain(self.given),
-            "files": files.contents(self.given, self.path),
+            "files": tree.contents(self.given, self.path),
             "free": [[f.key, f.low, f.high] for f in self.free],
             "gauge": self.gauge,
             "mu": list(self.mus),

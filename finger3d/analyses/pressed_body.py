@@ -42,8 +42,8 @@ from finger3d.mechanics.readings import Column, Gauge, Marker, in_space, strain_
 from finger3d.objects.rigid import RigidObject
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
-from finger3d.scene.files import contents
 from finger3d.scene.tables import LabelsTable
+from finger3d.scene.tree import contents
 
 if TYPE_CHECKING:
     from finger3d.mechanics.postprocess.labels import LabelGrid, Sample

@@ -11,14 +11,14 @@ from pathlib import Path
 from cyclopts import App, CycloptsError, MissingArgumentError
 
 from finger3d._extras import absent, message
-from finger3d._interruption import termination_interrupts
+from finger3d._interruption import fill_descriptors, termination_interrupts
 from finger3d._machine import enough_address_space
 from finger3d.cli.common import Interrupted, app
 from finger3d.cli.gone import gone
 from finger3d.cli.printing import complain
 from finger3d.cli.streams import safe_streams
-from finger3d.cli.terminal import fill_descriptors, least_width
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
+from finger3d.progress import least_width
 
 _COMMANDS = (
     "app_page calibrate compare cost estimate export identify info new optimise plan press sensitivity show sweep"

@@ -12,7 +12,6 @@ from cyclopts import App
 
 import finger3d
 from finger3d._machine import reserve_for_linear_algebra
-from finger3d.cli.folders import check_writable
 from finger3d.progress import Progress, reporter
 
 if TYPE_CHECKING:
@@ -73,6 +72,7 @@ def job(json_: bool, kept: Callable[[Progress], str]) -> Iterator[Progress]:
 
 def load(path: Path, overrides: list[str] | None, out: Path | None = None) -> Scene:
     """Load a scene with the overrides of --set, and check the output folder with `check_writable`."""
+    from finger3d.io import check_writable
     from finger3d.scene import load
 
     scene = load(path, overrides or [])

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from finger3d.cli.common import app, job, load
-from finger3d.cli.folders import check_folder
 from finger3d.cli.options import Flag, Json, Set
 from finger3d.cli.printing import print_json, print_rows
 from finger3d.errors import Finger3dError
@@ -70,6 +69,8 @@ def export(
     if what.mold + what.mesh + bool(what.solver) > 1:
         raise Finger3dError("export: --mold, --mesh and --solver write different things; give one of them")
     loaded = load(scene, set_)
+    from finger3d.io import check_folder
+
     check_folder(out)
     done: Exported | ModelFiles
     with job(json_, lambda _: f"the files in {out} are complete") as report:

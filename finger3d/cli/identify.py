@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from finger3d.cli.common import app, job
-from finger3d.cli.folders import check_writable
 from finger3d.cli.options import Continued, Json, Paths, Set, Texts
 from finger3d.cli.printing import print_json, print_page
 
@@ -40,6 +39,7 @@ def identify(
         to the measured depth; may be repeated.
     """
     from finger3d.analyses.identify.run import identify as run
+    from finger3d.io import check_writable
     from finger3d.report.analyses import identify_page
 
     check_writable(out, scene)

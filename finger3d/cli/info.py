@@ -24,14 +24,14 @@ def info(*, json_: Json = False) -> None:
 
     from finger3d._machine import cores, memory_bytes, versions
     from finger3d.fem.solvers import condense
-    from finger3d.meshing.cache import folder
+    from finger3d.meshing.generate import cache_folder
 
     memory = memory_bytes()
     machine: dict[str, object] = {
         "platform": platform.platform(),
         "cores": cores(),
         "memory_bytes": memory[0] if memory else None,
-        "mesh_cache": folder(),
+        "mesh_cache": cache_folder(),
         "environment": sys.prefix,
         "factorisation": condense.default_solver(),
     }

@@ -9,7 +9,6 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from finger3d.cli.common import app, job
-from finger3d.cli.folders import check_writable
 from finger3d.cli.options import Continued, Json, Noise, Set, Texts, Tolerances, parsed_tolerances
 from finger3d.cli.printing import print_json, print_page
 
@@ -21,7 +20,7 @@ class OptimiseOptions:
     Parameters
     ----------
     free
-        A free key and its bounds, for instance finger.radius_mm=60:200; may be repeated.
+        A free key and its bounds, as finger.radius_mm=60:200; may be repeated. Gauges alone share one condensed body.
     gauges
         Find the places and directions of so many gauges that together determine mu best, with all tolerances of
         a calibration; --free bounds gauge.x_mm, gauge.y_mm, gauge.z_mm and gauge.angle_deg.
@@ -60,8 +59,6 @@ def optimise(
 ) -> None:
     """Search for the design with the largest objective, starting from the scene; or for the places of several gauges.
 
-    If only keys of gauges are free, all designs share one condensed body.
-
     Example: finger3d optimise scene.toml --free gauge.g36.x_mm=10:48 --free gauge.g36.angle_deg=0:90 --out best
 
     Parameters
@@ -69,26 +66,25 @@ def optimise(
     scene
         The scene file (TOML).
     """
-    check_writable(out, scene)
     from finger3d.analyses.calibrate.settings import parsed_mus
+    from finger3d.analyses.gauge_places import place_gauges
+    from finger3d.analyses.optimise import optimise as run
+    from finger3d.io import check_writable
+    from finger3d.report.analyses import gauge_places_page, optimise_page
     from finger3d.results.summary import read_json
 
+    check_writable(out, scene)
     o, sets = options or OptimiseOptions(), set_ or []
     mus = parsed_mus(o.mu) if o.mu else None
     if o.gauges is None:
-        from finger3d.analyses.optimise import optimise as run
-        from finger3d.report.analyses import optimise_page as page
-
         with job(json_, lambda _: f"every evaluated design is kept in {out}; the same command continues") as report:
             run(scene, o.free or (), out, o.gauge, mus, o.noise, o.budget, o.seed, sets, report)
     else:
-        from finger3d.analyses.gauge_places import place_gauges
-        from finger3d.report.analyses import gauge_places_page as page
-
         with job(json_, lambda _: "nothing was written") as report:
             stds = parsed_tolerances(o.tolerance)
             place_gauges(scene, o.gauges, out, o.free or [], mus, o.noise, stds, sets, report, o.spacing)
     if json_:
         print_json(read_json(out / ("design.json" if o.gauges is None else "gauges.json")))
     else:
+        page = optimise_page if o.gauges is None else gauge_places_page
         print_page(page(out), (out / name for name in ("best.toml", "report.html")))

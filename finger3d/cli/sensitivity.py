@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from finger3d.cli.common import app, job
-from finger3d.cli.folders import check_writable
 from finger3d.cli.options import Json, Set, Texts, parsed_tolerances
 from finger3d.cli.printing import print_columns, print_json
 
@@ -38,6 +37,7 @@ def sensitivity(
         where one is known, else 1 % of the value.
     """
     from finger3d.analyses.sensitivity import sensitivity as run
+    from finger3d.io import check_writable
 
     check_writable(out, scene)
     with job(json_, lambda _: "effects are written together at the end") as report:

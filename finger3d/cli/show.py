@@ -6,7 +6,6 @@ import webbrowser
 from pathlib import Path
 
 from finger3d.cli.common import app
-from finger3d.cli.folders import check_folder
 from finger3d.errors import Finger3dError
 
 
@@ -40,6 +39,8 @@ def show(
         return
     if png.suffix.lower() != ".png":
         raise Finger3dError(f"show: --png {png}: must end in .png")
+    from finger3d.io import check_folder
+
     check_folder(png.parent)
     if (folder / "sweep.json").is_file():
         if step is not None:

@@ -8,7 +8,6 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from finger3d.cli.common import app, job
-from finger3d.cli.folders import check_writable
 from finger3d.cli.options import Continued, Json, Set
 from finger3d.cli.printing import print_columns, print_json, print_page
 from finger3d.cli.sweep_options import SweepOptions
@@ -51,6 +50,8 @@ def sweep(
         if not done.steps_done:
             return "no point was finished"
         return f"{done.steps_done} of {done.steps_total} points are kept in {out}; the same command continues"
+
+    from finger3d.io import check_writable
 
     check_writable(out, scene)
     given = options.points or (options.vary if options.sample is None else options.range) or ()

@@ -314,7 +314,7 @@ class Gauge:
 
     def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
         """Return the relative elongation of the line, (1,)."""
-        from finger3d.fem.solids.hyperelastic import stretch
+        from finger3d.fem.hyperelastic import stretch
 
         mesh, axes = body.mesh, body.axes
         if self.is_point:

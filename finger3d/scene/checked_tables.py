@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from pydantic import ValidationError
 
@@ -14,20 +14,27 @@ from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
 from finger3d.geometry.design import Design, designs
 from finger3d.geometry.files import SUFFIXES
+from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import OBJECTS, RigidObject
-from finger3d.scene import files
 from finger3d.scene.messages import Place, choose, described, dotted, listed, message, messages_from, nearest, unknown
 from finger3d.scene.tables import (
     AutoTable,
+    FileTable,
     GripTable,
     LegsTable,
     LegTable,
+    MeshFileTable,
     PressTable,
     Record,
     TomlTable,
     record_of,
     table_of,
 )
+from finger3d.scene.tree import FINGER_SUFFIXES, is_file
+
+if TYPE_CHECKING:
+    from finger3d.geometry.imported import Imported
+    from finger3d.meshing.given import GivenMesh
 
 AnyTable = TypeVar("AnyTable", bound=TomlTable)
 
@@ -55,14 +62,31 @@ def design_of(geometry: str, dimensions: TomlTable | None, mistakes: dict[Place,
     """Build the finger from a design, or read it from a file."""
     if dimensions is None:
         return None
-    if not files.is_file(geometry):
+    if not is_file(geometry):
         design: Design | None = built(designs()[geometry], dimensions, ("finger",), mistakes)
         return design
     try:
-        return files.finger(geometry, dimensions)
+        return _finger(geometry, dimensions)
     except Finger3dError as error:
         mistakes["finger", "geometry"] = f"finger.geometry: {error}"
         return None
+
+
+def _finger(path: str, table: TomlTable) -> Imported | GivenMesh:
+    """Return the finger in a file, turned as its table says."""
+    if path.lower().endswith(MESH_SUFFIXES):
+        from finger3d.meshing.given import given_mesh
+
+        return given_mesh(path, cast(MeshFileTable, table).scale)
+    from finger3d.geometry.imported import imported
+
+    file = cast(FileTable, table)
+    return imported(path, scale=file.scale, up=file.up)
+
+
+def _table_of_file(path: str) -> type[TomlTable]:
+    """Return the table of the keys beside a file."""
+    return MeshFileTable if path.lower().endswith(MESH_SUFFIXES) else FileTable
 
 
 def object_of(shape: str, placed: TomlTable | None, mistakes: dict[Place, str]) -> RigidObject | None:
@@ -102,18 +126,18 @@ def named(
     if isinstance(value, str) and not one_line(value):
         mistakes[place] = message(place, value, f"must be {described(PathName)}")
         return "", None
-    if name == "finger" and files.is_file(value):
+    if name == "finger" and is_file(value):
         if not Path(value).exists():
             # Reported alone: the other keys may be those of the design that the file replaces.
             advice = f"give its path from the scene's folder, or a design: {listed(types)}"
             mistakes[place] = f"{name}.{key}: {value}: there is no such file; {advice}"
             return "", None
         extra: dict[Place, str] = {}
-        table = checked(files.table_of_file(value), rest, (name,), extra, also=(key,))
+        table = checked(_table_of_file(value), rest, (name,), extra, also=(key,))
         mistakes |= {p: t.replace("no such key", "no such key beside this file, take it out") for p, t in extra.items()}
         return value, table
     if name == "finger" and isinstance(value, str) and "." in value:
-        mistakes[place] = message(place, value, f"a file must be named {listed(files.FINGER_SUFFIXES)}")
+        mistakes[place] = message(place, value, f"a file must be named {listed(FINGER_SUFFIXES)}")
     elif name == "object" and isinstance(value, str) and value.lower().endswith(SUFFIXES):
         mistakes[place] = message(place, value, 'must be "mesh", and the file its path')
     elif not isinstance(value, str) or value not in types:

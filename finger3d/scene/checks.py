@@ -22,6 +22,7 @@ from finger3d.mechanics.readings import (
     strain_columns,
 )
 from finger3d.meshing.given import GivenMesh
+from finger3d.objects import MeshObject, RigidObject
 from finger3d.scene.material import check_parts
 from finger3d.scene.mesh_sizes import smallest_mm
 from finger3d.scene.messages import Place, dotted, message, shown
@@ -34,6 +35,8 @@ _ELASTOMERS_MPA = 1e-3, 100.0
 
 _FINGERS_MM = 0.1, 1000.0
 """Heights of fingers."""
+
+_APART = 200.0  # sizes of object and finger that differ more than this are in different units, or cannot be meshed
 
 
 def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> list[str]:
@@ -305,3 +308,21 @@ def _taxel(index: int, taxel: TaxelTable, design: Design, solid: bool) -> list[s
         nearer = f"{leaves}; must be smaller, or nearer to the middle"
         return [message(("taxel", index, "x_mm"), taxel.x_mm, nearer)]
     return []
+
+
+def unit_mistakes(design: Design, obj: RigidObject) -> list[str]:
+    """Return a line if a triangulated object is far too large or far too small for the finger."""
+    if not isinstance(obj, MeshObject):
+        return []
+    longest = max(design.height_mm, 2.0 * design.half_length_mm, design.width_mm)
+    extent = obj.surface.high - obj.surface.low
+    ratio = float(extent.max()) / longest
+    if 1.0 / _APART <= ratio <= _APART:
+        return []
+    box = " x ".join(f"{e:.4g}" for e in extent)
+    relation = f"{ratio:.3g} times as large as" if ratio > 1.0 else f"{1.0 / ratio:.3g} times smaller than"
+    advice = "0.001 if it was drawn in micrometres" if ratio > 1.0 else "1000 if it was drawn in metres, 25.4 in inches"
+    return [
+        f"object.path: the object's box is {box} mm, {relation} the finger of {longest:.4g} mm; is its unit right? "
+        f"Give object.scale, for instance {advice}"
+    ]

@@ -18,7 +18,7 @@ from finger3d.materials.modulus import ElasticConstants
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, first_contact
 from finger3d.mechanics.readings import Gauge, Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject
-from finger3d.scene import checks, files, material, messages, tree
+from finger3d.scene import checks, material, messages, tree
 from finger3d.scene.checked_tables import checked, design_of, effects_of, named, object_of, press_of, shaped
 from finger3d.scene.material import parts_of, path_of
 from finger3d.scene.mesh_sizes import mesh_options
@@ -195,7 +195,7 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
     path : the file it came from, for messages
     set_keys : keys that came from the command line, for messages; with the option that gave them if not ``--set``
     """
-    given = tree.frozen(files.absolute(given, path))
+    given = tree.frozen(tree.absolute(given, path))
     mistakes: dict[Place, str] = {}
     tables = checked(SceneTable, given, (), mistakes)
     mistakes |= material.mistakes(tables.material, ("material",)) if tables else {}
@@ -211,7 +211,7 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
         raise messages.refusal([mistakes[p] for p in places], path, set_keys)
     legs = press.leg if isinstance(press, LegsTable) else (press,)
     lines = checks.check(tables, legs, design)
-    if lines := [*lines, *files.unit_mistakes(design, rigid)]:
+    if lines := [*lines, *checks.unit_mistakes(design, rigid)]:
         raise messages.refusal(lines, path, set_keys)
     tolerance = auto.auto_tolerance or tables.mesh.tolerance or _AUTO_TOLERANCE
     try:

@@ -1,15 +1,18 @@
-"""Scene files as trees of dicts and tuples: reading, overriding keys, and writing."""
+"""Scene files as trees of dicts and tuples: reading, overriding keys, files of bodies, and writing."""
 
 from __future__ import annotations
 
 import copy
+import os
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
+from finger3d.geometry.files import SUFFIXES, content
+from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.scene.material import replace_modulus
 from finger3d.scene.messages import listed, nearest, shown
 
@@ -21,6 +24,9 @@ _ALTERNATIVES = (
 
 _DEEPEST = 50
 """Most parts of a dotted key, and most levels of tables and lists: far above any scene."""
+
+FINGER_SUFFIXES = (*SUFFIXES, *MESH_SUFFIXES)
+"""Files that may be a finger; an object is no mesh of tetrahedra."""
 
 
 def read(path: Path) -> Tree:
@@ -172,6 +178,34 @@ def _set(node: Any, parts: list[str], value: Any, key: str) -> None:
             node[index] = value
         else:
             node = node[index]
+
+
+def is_file(geometry: object) -> bool:
+    """Whether finger.geometry names a file and not a design."""
+    return isinstance(geometry, str) and geometry.lower().endswith(FINGER_SUFFIXES)
+
+
+def absolute(document: TreeView, scene: Path | None) -> Tree:
+    """Return the tree with absolute paths of its bodies; those in it are relative to the file of the scene."""
+    folder = scene.parent if scene else Path()
+    tree = dict(document)
+    for table, key, value in _named(document):
+        tree[table] = {**document[table], key: os.path.realpath(folder / value)}
+    return tree
+
+
+def contents(document: TreeView, scene: Path | None = None) -> dict[str, str]:
+    """Return the SHA-256 of each file of a body that a scene names, by its path."""
+    named = absolute(document, scene)
+    return {value: content(Path(value)) for _, _, value in _named(named)}
+
+
+def _named(document: TreeView) -> Iterator[tuple[str, str, str]]:
+    """Yield the table, the key and the path of each file of a body that a scene names."""
+    for table, key in (("finger", "geometry"), ("object", "path")):
+        keys = document.get(table)
+        if isinstance(keys, Mapping) and isinstance(value := keys.get(key), str) and (key == "path" or is_file(value)):
+            yield table, key, value
 
 
 def written(tree: TreeView) -> str:

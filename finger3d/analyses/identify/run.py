@@ -37,7 +37,7 @@ from finger3d.plotting.analyses import Panel, draw_identification
 from finger3d.progress import Progress
 from finger3d.report.analyses import identify_page
 from finger3d.results.journal import opened
-from finger3d.scene import Scene, Source, files, parse, tables_of, tree
+from finger3d.scene import Scene, Source, parse, tables_of, tree
 
 DEVIATIONS = "of the noise of the data, and of the errors of mesh and increments"
 """What the standard deviations of an identification contain."""
@@ -228,7 +228,7 @@ def identify(
             check_rows(bound.model().legs, keys, data)
     task = {
         "scene": tree.plain(given),
-        "files": files.contents(given, path),
+        "files": tree.contents(given, path),
         "free": [[f.key, f.low, f.high] for f in keys],
         "measured": [hashlib.sha256(file.read_bytes()).hexdigest()[:16] for file in (*files_of_press, *files_of_tests)],
     }

@@ -21,7 +21,6 @@ from finger3d.mechanics.postprocess.marker_grid import grid_markers
 from finger3d.mechanics.readings import Marker
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, parse, tables_of, tree
-from finger3d.scene import files as bodies
 from finger3d.scene.messages import shown
 from finger3d.scene.tables import LabelsTable, SceneTable
 
@@ -150,7 +149,7 @@ class Sweep:
             "vary": {v.key: list(v.texts) for v in self.vary},
             **({"list": True} if self.is_list else {}),
             "points": len(self.points),
-            "files": bodies.contents(self.given),
+            "files": tree.contents(self.given),
             "bodies": list(self.bodies),
         }
 
@@ -209,7 +208,7 @@ def checked_points(
         first, mesh = of[0][0], finest([scene.model() for scene, _ in of])
         variants = _shaping([variant for _, variant in of], first.tables.labels)
         shared[key] = BodySpec(key, variants, mesh, first.given, grids[key], first.tables.labels)
-    return Sweep(bodies.absolute(base, path), vary, tuple(checked), shared, scenes[0].title, is_list)
+    return Sweep(tree.absolute(base, path), vary, tuple(checked), shared, scenes[0].title, is_list)
 
 
 def _shaping(variants: Sequence[Variant], labels: LabelsTable | None) -> tuple[Variant, ...]:

@@ -7,6 +7,7 @@ import os
 import sys
 import weakref
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
@@ -25,6 +26,7 @@ Threads: TypeAlias = Callable[[int], int]
 _MTYPE = ctypes.c_int32(-2)  # real, symmetric, indefinite
 _INT32_MAX = 2**31 - 1
 _NO_MEMORY = -2
+_RELEASE = -1  # phase that releases all memory
 
 
 def library() -> tuple[Call, Threads, int]:
@@ -77,28 +79,27 @@ class PardisoFactor:
         if upper.nnz > _INT32_MAX:
             raise MissingError("matrix has more entries than 32-bit PARDISO can index")
         # PARDISO crashes if a matrix is factored again on another number of threads
-        self._call, self._set_threads, self._threads = library()
-        self._n = upper.shape[0]
-        self._rows = rows
-        self._a = np.ascontiguousarray(upper.data, dtype=np.float64)
-        self._ia = upper.indptr.astype(np.int32) + 1
-        self._ja = upper.indices.astype(np.int32) + 1
-        self._pt = np.zeros(64, dtype=np.int64)
-        self._perm = np.zeros(self._n, dtype=np.int32)
-        self._perm[self._n - rows :] = 1
-        self._iparm = np.zeros(64, dtype=np.int32)
+        call, self._set_threads, self._threads = library()
+        n = upper.shape[0]
+        self._n, self._rows = n, rows
+        a = np.ascontiguousarray(upper.data, dtype=np.float64)
+        ia, ja = upper.indptr.astype(np.int32) + 1, upper.indices.astype(np.int32) + 1
+        perm = np.zeros(n, dtype=np.int32)
+        perm[n - rows :] = 1
+        self._handle = _Handle(call, n, a, ia, ja, perm)
+        iparm = self._handle.iparm
         # Own settings, parallel METIS, pivot threshold 1e-13, Bunch-Kaufman.  Two-level factorisation, other
         # pivoting and matching save no time; out of core, the Schur complement returned is zero.
-        self._iparm[[0, 1, 9, 20]] = 1, 3, 13, 1
-        self._iparm[35] = 2  # Schur complement, and keep the factor for solves
-        self._finalizer = weakref.finalize(self, _release, self._call, self._pt, self._n, self._iparm)
+        iparm[[0, 1, 9, 20]] = 1, 3, 13, 1
+        iparm[35] = 2  # Schur complement, and keep the factor for solves
+        self._finalizer = weakref.finalize(self, self._handle.run, _RELEASE, np.zeros(1), np.zeros(1), 1)
         self.factorizations = 0
         self._phase(11, np.zeros(1), np.zeros(1), 1)
         self._factorize()
 
     def renew(self, data: Float) -> None:
         """Factor another matrix with entries of its upper triangle in the same places, in the order given first."""
-        self._a = np.ascontiguousarray(data, dtype=np.float64)
+        self._handle.a = np.ascontiguousarray(data, dtype=np.float64)
         self._factorize()
 
     def _factorize(self) -> None:
@@ -106,12 +107,12 @@ class PardisoFactor:
         schur = np.zeros((self._rows, self._rows), order="F")
         self._phase(22, np.zeros(1), schur, 1)
         self.schur = np.asarray(schur)
-        self.perturbed = int(self._iparm[13])
+        self.perturbed = int(self._handle.iparm[13])
 
     def _phase(self, phase: int, b: Float, x: Float, nrhs: int) -> None:
         before = self._set_threads(self._threads)
         try:
-            _run(self._call, self._pt, phase, self._n, self._a, self._ia, self._ja, self._perm, nrhs, self._iparm, b, x)
+            self._handle.run(phase, b, x, nrhs)
         finally:
             self._set_threads(before)
 
@@ -136,40 +137,48 @@ class PardisoFactor:
         return x[:n]
 
 
-def _run(
-    call: Call,
-    pt: Array,
-    phase: int,
-    n: int,
-    a: Array,
-    ia: Array,
-    ja: Array,
-    perm: Array,
-    nrhs: int,
-    iparm: Array,
-    b: Array,
-    x: Array,
-) -> None:
-    def i32(value: int) -> object:
-        return ctypes.byref(ctypes.c_int32(value))
+@dataclass
+class _Handle:
+    """A matrix and PARDISO's memory for it, which outlives its factor until that is released.
 
-    def pointer(array: Array, kind: type[ctypes.c_int32 | ctypes.c_int64] = ctypes.c_int32) -> object:
-        return array.ctypes.data_as(ctypes.POINTER(kind))
+    Attributes
+    ----------
+    call : PARDISO
+    n : number of rows
+    a, ia, ja : upper triangle in compressed rows, with indices from 1
+    perm : (n,), 1 for the rows of the Schur complement
+    pt, iparm : pointers to its memory, and its settings
+    """
 
-    error = ctypes.c_int32(0)
-    call(
-        pointer(pt, ctypes.c_int64), i32(1), i32(1), ctypes.byref(_MTYPE), i32(phase), i32(n),
-        a.ctypes.data_as(ctypes.c_void_p), pointer(ia), pointer(ja), pointer(perm), i32(nrhs), pointer(iparm), i32(0),
-        b.ctypes.data_as(ctypes.c_void_p), x.ctypes.data_as(ctypes.c_void_p), ctypes.byref(error),
-    )  # fmt: skip
-    if error.value == _NO_MEMORY:
-        raise MemoryError(f"PARDISO phase {phase}")
-    if error.value:
-        reason = {-1: "inconsistent input", -3: "reordering", -4: "zero pivot"}
-        raise MissingError(f"PARDISO phase {phase}: error {error.value} ({reason.get(error.value, 'see MKL manual')})")
+    call: Call
+    n: int
+    a: Array
+    ia: Array
+    ja: Array
+    perm: Array
+    pt: Array = field(default_factory=lambda: np.zeros(64, dtype=np.int64))
+    iparm: Array = field(default_factory=lambda: np.zeros(64, dtype=np.int32))
 
+    def run(self, phase: int, b: Float, x: Float, nrhs: int) -> None:
+        """Run a phase with `nrhs` right-hand sides b and solutions x."""
 
-def _release(call: Call, pt: Array, n: int, iparm: Array) -> None:
-    one = np.zeros(1)
-    index = np.ones(1, dtype=np.int32)
-    _run(call, pt, -1, n, one, index, index, index, 1, iparm, one, one)
+        def i32(value: int) -> object:
+            return ctypes.byref(ctypes.c_int32(value))
+
+        def pointer(array: Array, kind: type[ctypes.c_int32 | ctypes.c_int64] = ctypes.c_int32) -> object:
+            return array.ctypes.data_as(ctypes.POINTER(kind))
+
+        error = ctypes.c_int32(0)
+        self.call(
+            pointer(self.pt, ctypes.c_int64), i32(1), i32(1), ctypes.byref(_MTYPE), i32(phase), i32(self.n),
+            self.a.ctypes.data_as(ctypes.c_void_p), pointer(self.ia), pointer(self.ja), pointer(self.perm), i32(nrhs),
+            pointer(self.iparm), i32(0), b.ctypes.data_as(ctypes.c_void_p), x.ctypes.data_as(ctypes.c_void_p),
+            ctypes.byref(error),
+        )  # fmt: skip
+        if error.value == _NO_MEMORY:
+            raise MemoryError(f"PARDISO phase {phase}")
+        if error.value:
+            reason = {-1: "inconsistent input", -3: "reordering", -4: "zero pivot"}
+            raise MissingError(
+                f"PARDISO phase {phase}: error {error.value} ({reason.get(error.value, 'see MKL manual')})"
+            )

@@ -6,7 +6,7 @@ stiffness a spring on that row, so the body keeps its one factorisation (Woodbur
 side over the foil's width along z; in a section the foil is spread over the finger's width.
 
 The compliance of the body under a foil's own forces is not taken from the mesh, which would need cells of a hundredth
-of the foil, but from a foil in an infinite body (`finger3d.fem.solids.embedded`).  This neglects the effect of the
+of the foil, but from a foil in an infinite body (`finger3d.fem.embedded`).  This neglects the effect of the
 body's surface, which decays within the foil's length (see validation/embedded_gauge_study.py).  The foil has no bending
 and no shear stiffness, and no volume.
 """
@@ -21,9 +21,9 @@ import scipy.sparse as sp
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
+from finger3d.fem.embedded import AddedStiffness, Bars, FoilPatches, InfiniteBody
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import Mesh, cells_at, reflect_into_part
-from finger3d.fem.solids.embedded import AddedStiffness, Bars, FoilPatches, InfiniteBody
 from finger3d.fem.surface import displacement_rows
 from finger3d.mechanics.model import Foils, Model
 from finger3d.mechanics.readings import Gauge

@@ -15,10 +15,10 @@ from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness
+from finger3d.fem.embedded import AddedStiffness
 from finger3d.fem.laws.material import LinearElasticity, moduli_of
 from finger3d.fem.mesh import FREE_FACES, Mesh
 from finger3d.fem.recovery import strain_and_stress
-from finger3d.fem.solids.embedded import AddedStiffness
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface import BoundarySurface, joined, surface
 from finger3d.mechanics.discretise.contact_points import ContactPoints, contact_geometry, may_touch

@@ -10,11 +10,11 @@ import scipy.sparse as sp
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Pattern, Stiffness
+from finger3d.fem.embedded import BarRelaxation, Bars
+from finger3d.fem.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
 from finger3d.fem.laws.base import Inhomogeneous, least_stiffness, unstable_from
 from finger3d.fem.laws.relaxation import InternalVariables, Relaxation, Step
 from finger3d.fem.recovery import displacement
-from finger3d.fem.solids.embedded import BarRelaxation, Bars
-from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface import BoundarySurface, DeformedContact, deformed_contact
 from finger3d.fem.tensors import bases_of

@@ -20,11 +20,11 @@ from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
+from finger3d.fem.hyperelastic import Hyperelastic, nodal_fields
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.laws.relaxation import InternalVariables, Relaxation, Step, relaxed
 from finger3d.fem.mesh import quadrature
 from finger3d.fem.recovery import displacement, extrapolated
-from finger3d.fem.solids.hyperelastic import Hyperelastic, nodal_fields
 from finger3d.fem.surface import BoundarySurface
 from finger3d.fem.tensors import InvertedError, determinant
 from finger3d.mechanics.discretise.problem import Problem

@@ -14,34 +14,12 @@ import numpy as np
 from finger3d._types import Array, Float, Int
 
 
-def pytetwild(
-    points: Float,
-    triangles: Int,
-    edge_length: Array,
-    epsilon: Array,
-    stop_energy: Array,
-    keep_outside: Array,
-    bg_points: Float,
-    bg_tets: Int,
-    bg_values: Float,
-) -> Mapping[str, Array]:
-    """Return points (n, 3) and positive tets (m, 4) inside a surface, graded by a background mesh."""
+def pytetwild(points: Float, triangles: Int, **options: Array) -> Mapping[str, Array]:
+    """Return points (n, 3) and positive tets (m, 4) inside a surface, with options of ``pytetwild.tetrahedralize``."""
     import pytetwild
 
-    nodes, tets = pytetwild.tetrahedralize(
-        points,
-        triangles.astype(np.int32),
-        edge_length_abs=float(edge_length),
-        epsilon=float(epsilon),
-        stop_energy=float(stop_energy),
-        num_threads=1,
-        quiet=True,
-        vtk_ordering=True,
-        disable_filtering=bool(keep_outside),
-        bg_vertices=bg_points,
-        bg_tets=bg_tets.astype(np.int32),
-        bg_values=bg_values,
-    )
+    given = {name: value.item() if value.ndim == 0 else value for name, value in options.items()}
+    nodes, tets = pytetwild.tetrahedralize(points, triangles, num_threads=1, quiet=True, vtk_ordering=True, **given)
     return {"points": np.asarray(nodes, dtype=np.float64), "tets": np.asarray(tets, dtype=np.int64)}
 
 

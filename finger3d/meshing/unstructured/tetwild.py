@@ -148,7 +148,9 @@ def run_child(
 
     pytetwild finds the inside by winding numbers, which triangles inside the body would make ambiguous.
     """
-    surface = {"points": points, "triangles": triangles}
-    limits = {"edge_length": field.longest_mm, "epsilon": epsilon, "stop_energy": STOP_ENERGY}
-    sizes = dict(zip(("bg_points", "bg_tets", "bg_values"), field.background(), strict=True))
-    return run_mesher(_meshers.pytetwild, limit, **surface, **limits, keep_outside=keep_outside, **sizes)
+    bg_vertices, bg_tets, bg_values = field.background()
+    return run_mesher(
+        _meshers.pytetwild, limit, points=points, triangles=triangles.astype(np.int32),
+        edge_length_abs=field.longest_mm, epsilon=epsilon, stop_energy=STOP_ENERGY, disable_filtering=keep_outside,
+        bg_vertices=bg_vertices, bg_tets=bg_tets.astype(np.int32), bg_values=bg_values,
+    )  # fmt: skip

@@ -1,1 +1,0 @@
-"""Forces and stiffness of solids, and what is embedded in them."""
