@@ -28,11 +28,14 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.readings import ORDER, Column, Kind, kinds_of
 
-_LEAST = 0.002
+_LEAST = 0.001
 """Least relative error over h/a, for points of distance h in a contact of half-length a: all companions may agree."""
 
-_LEAST_OF_ZONES = 0.04
+_LEAST_OF_ZONES = 0.02
 """The same for lengths and areas of contact and stick, which points on the border enter or leave unseen."""
+
+_LEAST_OF_STICK = 0.1
+"""The same for stick where all points stick: a ring of slip that is narrower than their distance is unseen."""
 
 _LEAST_SLIP = 0.1
 """Share of the work for that of few points that slip unseen."""
@@ -66,7 +69,7 @@ def scale_of(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str)
         return reach
     if kind is Kind.FORCE:
         return force
-    if kind is Kind.SHARE:
+    if kind in (Kind.SHARE, Kind.MARGIN):
         return 1.0
     if kind is Kind.MOMENT:
         return max(scale, force * reach)
@@ -121,6 +124,7 @@ def spread_error(
         Errors in the units of the numbers; names without a finite error are left out.
     """
     kinds, told = kinds_of(readings), list(companions)
+    all_stick = numbers.get("stick_ratio_area", 0.0) >= 1.0 - _NOTHING
     found = {}
     for name, value in numbers.items():
         bar = spread(kinds[name], value, [(ratio, other[name]) for ratio, other in told])
@@ -128,6 +132,8 @@ def spread_error(
         if kinds[name] is Kind.DISSIPATION and abs(value) < scale:  # nothing slips
             scale *= _LEAST_SLIP
         least = _LEAST_OF_ZONES if kinds[name].is_zone else _LEAST
+        if all_stick and kinds[name].is_stick:
+            least = _LEAST_OF_STICK
         found[name] = max(bar, least * spacing * scale)
     return {name: error for name, error in found.items() if math.isfinite(error)}
 
