@@ -385,7 +385,7 @@ class Kind(Enum):
 
     @property
     def bar_factor(self) -> float:
-        """Factor c of the error bars, fitted to presses of 96 drawn sections and 54 solids, 48 of them deformed largely."""
+        """Factor c of the error bars, fitted to 96 drawn sections and 54 solids, a third of them deformed largely."""
         return 0.8 if self.is_zone else _FITTED.get(self, 0.9)
 
 
