@@ -240,8 +240,17 @@ def test_one_companion_that_agrees_by_chance_does_not_make_the_error_vanish() ->
 
 def test_no_error_is_below_what_the_distance_of_the_points_leaves_open() -> None:
     found = spread_error(NUMBERS, [(2.0, NUMBERS)], spacing=0.1)
-    # 0.002 h/a of the number itself, for a net force of the normal force; 0.04 of a length or an area
-    assert found == pytest.approx(dict(zip(NUMBERS, (4e-4, 4e-3, 2e-3, 4e-4), strict=True)), rel=1e-12)
+    # 0.001 h/a of the number itself, for a net force of the normal force; 0.02 of a length or an area
+    assert found == pytest.approx(dict(zip(NUMBERS, (2e-4, 2e-3, 1e-3, 2e-4), strict=True)), rel=1e-12)
+
+
+def test_a_ring_of_slip_narrower_than_the_distance_of_the_points_is_left_open_where_all_stick() -> None:
+    stuck = NUMBERS | {"stick_ratio_area": 1.0}
+    found = spread_error(stuck, [(2.0, stuck)], spacing=0.1)
+    assert (found["stick_area_mm2"], found["stick_ratio_area"]) == pytest.approx(
+        (0.1 * 0.1 * 0.5, 0.1 * 0.1), rel=1e-12
+    )
+    assert found["contact_half_length_mm"] == pytest.approx(2e-3, rel=1e-12)
 
 
 def test_an_error_bar_is_the_sum_of_both_errors() -> None:
