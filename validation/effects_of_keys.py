@@ -1,11 +1,11 @@
 """Are the effects of a scene's keys, as `finger3d sensitivity` tells them, those on a mesh with half the edges?
 
 No source; the truth is the same difference of presses on half the edge lengths, in the same increments.  Scenes are
-drawn as those of effects_by_need, with a new seed in each full run: sections under every object in small strain and at
-large deformation, and swept solids.  Every key is changed by its tolerance, or by 1 %, to both sides.  Effects on
-forces, work and readings are compared with the larger of both; those on zones, which move with the contact points from
-one to the next, and all signs with the error that is told.  Effects below a thousandth of the number's natural scale
-are left out, but for their errors.
+drawn as those of effects_by_need, with a new seed in each full run, and pressed on their default meshes: sections under
+every object in small strain and at large deformation, and solids.  Every key is changed by its tolerance, or by 1 %, to
+both sides.  Effects on forces, work and readings are compared with the larger of both; those on zones, which move with
+the contact points from one to the next, and all signs with the error that is told.  Effects below a thousandth of the
+number's natural scale are left out, but for their errors.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ class Judged(NamedTuple):
 
 def drawn(sections: int, large: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]:
     """Names and scenes, those at large deformation after the other sections."""
-    for number, (name, scene) in enumerate(scenes(sections + large, solids, seed, longer=1.0)):
+    for number, (name, scene) in enumerate(scenes(sections + large, solids, seed)):
         is_large = sections <= number < sections + large
-        tables: Tree = {key: value for key, value in scene.as_dict().items() if key != "effects"}
+        tables: Tree = {key: value for key, value in scene.as_dict().items() if key not in ("effects", "mesh")}
         effects: Tree = {"auto": False, **({"large_deformation": {}} if is_large else {})}
         yield f"{name}{', large deformation' * is_large}", parse({**tables, "effects": effects})
 
