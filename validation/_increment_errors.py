@@ -19,14 +19,14 @@ from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Gauge, Leg, Model
+from finger3d.mechanics.model import Leg, Model
 from finger3d.objects import Cylinder, Sphere
 
 from ._common import ticks_at
 from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, STRESS, Profile, fig9, half_cylinder, line_r5, said, strains
-from ._press import changed, in_increments, under
+from ._press import PAPER_GAUGE, changed, in_increments, under
 from ._rows import Result, Row, columns, listed, together
 
 judged = listed(__file__)
@@ -104,7 +104,7 @@ ROUND_OFF = 1e-9
 PLAIN = 160
 """Plain increments that twenty are compared with."""
 QUANTITIES = ("friction sum", "stick area", "gauge", "dissipation", "energy balance")
-GAUGE = Gauge("g", 36.0, 40.0, angle=float(np.deg2rad(30.0)))
+
 
 BAR = Cylinder(radius_mm=20.0, axis="z")
 
@@ -121,12 +121,12 @@ class Press:
 
 def presses(quick: bool) -> Iterator[Press]:
     """All presses; quick ones on coarse meshes."""
-    section = fig9(0.49, STRAIN, 2.0 if quick else 1.0, [GAUGE]).model
+    section = fig9(0.49, STRAIN, 2.0 if quick else 1.0, [PAPER_GAUGE]).model
     on_bar = replace(section, object=BAR, legs=(Leg(6.0),))
     few = 320 if quick else 640
     yield Press("section on a bar", on_bar, 0.5, few)
     yield Press("bar is released", replace(on_bar, legs=(Leg(6.0), Leg(2.0))), 0.5, few)
-    solid = fig9(0.49, "solid", 5.0 if quick else 2.5, [GAUGE]).model
+    solid = fig9(0.49, "solid", 5.0 if quick else 2.5, [PAPER_GAUGE]).model
     yield Press("solid on a plane", solid, 0.5, few)
     if not quick:
         yield Press("bar slides", replace(on_bar, legs=(Leg(5.0), Leg(5.0, slide_x_mm=2.0))), 0.5, few)

@@ -70,6 +70,10 @@ def block_tables(size_mm: Sequence[float], E_MPa: float, nu: float, edges: Seque
     }
 
 
+PAPER_GAUGE = Gauge("g", 36.0, 40.0, angle=math.radians(30.0))
+"""The gauge of the paper, at a point; its depth is not told."""
+
+
 def paper_gauges(length_mm: float, y_mm: float = 40.0) -> tuple[Gauge, Gauge]:
     """Return the gauge of 30 degrees at x = 36 mm, "g", and its mirror image, "m"."""
     turn = math.radians(30.0)

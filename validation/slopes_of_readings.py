@@ -26,9 +26,9 @@ from finger3d._types import Float
 from finger3d.analyses.pressed_body import presses
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 
-from ._press import fig9_finger
+from ._press import PAPER_GAUGE, fig9_finger
 from ._rows import Result, Row, columns, given, listed
 
 judged = listed(__file__)
@@ -70,8 +70,8 @@ def curve(case: str, refinement: float, size: float, steps: int) -> Curve:
     """Return the strain of the gauge over mu on a mesh."""
     domain, mesher, growth = (CASES[case][key] for key in ("domain", "mesher", "growth"))
     mesh = MeshOptions(size, growth * size, mesher, gauge_refinement=refinement)
-    gauge = Gauge("g", 36.0, 40.0, angle=math.radians(30.0))
-    model = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, (Leg(10.0, steps=steps),), gauges=(gauge,), domain=domain)
+    legs, gauges = (Leg(10.0, steps=steps),), (PAPER_GAUGE,)
+    model = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, gauges=gauges, domain=domain)
     problem = build(model)
     ends = [press.frame for press in presses(problem, ENDS.tolist())]
     strain = [end.gauges["g"] if end.outcome.ok else math.nan for end in ends]
