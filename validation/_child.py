@@ -29,18 +29,19 @@ Key = TypeVar("Key")
 
 def peak_mb() -> float:
     """Largest resident memory (MB) of this process since its start or the last `reset_peak`."""
-    for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
-        if line.startswith("VmHWM:"):
-            return float(line.split()[1]) / 1024.0
-    raise OSError("/proc/self/status has no VmHWM")
+    return _kilobytes("/proc/self/status", "VmHWM") / 1024.0
 
 
 def available_gb() -> float:
     """Memory (GB) that processes can get without swapping, page cache included."""
-    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
-        if line.startswith("MemAvailable:"):
-            return float(line.split()[1]) * 1024e-9
-    raise OSError("/proc/meminfo has no MemAvailable")
+    return _kilobytes("/proc/meminfo", "MemAvailable") * 1024e-9
+
+
+def _kilobytes(file: str, key: str) -> float:
+    for line in Path(file).read_text(encoding="ascii").splitlines():
+        if line.startswith(f"{key}:"):
+            return float(line.split()[1])
+    raise OSError(f"{file} has no {key}")
 
 
 def reset_peak() -> None:

@@ -14,10 +14,8 @@ of the load converges as h^(2 e).  A section under a plane has no increments; el
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,7 +32,7 @@ from ._cost_figure import draw
 from ._cost_runs import MODULE
 from ._cost_truth import LENGTHS, Advice, Known, Truth, advise, mesh_errors, seconds, step_errors, truth, value
 from ._press import empty_mesh_cache
-from ._rows import Result, Row, listed, of_records, zero
+from ._rows import Result, Row, given, listed, of_records, zero
 
 judged = listed(__file__)
 
@@ -42,7 +40,7 @@ TARGETS = (0.05, 0.01, 0.001)
 WIDTH = 20.0  # of the solid
 NEED_GB = 14.0  # of free memory, for 500 000 unknowns
 
-BODIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["body"]
+BODIES = given(__file__)["body"]
 """By body: its height, its best element, the claims of the defaults, and the edge lengths of all series."""
 
 BEST = {body: given["best"] for body, given in BODIES.items()}
@@ -111,7 +109,7 @@ def _judged(made: Mapping[str, Groups], runs: Runs, quick: bool) -> Result:
             rows += [*_solver_rows(body, series, runs), *_locking_rows(body, series, errors)]
         if not quick:
             rows += _slower_row(body, series, runs) if body not in LARGE.values() else _large_row(body, series, runs)
-            rows += _default_rows(body, runs, errors, truths[body], steps[body])
+            rows += _default_rows(body, errors, truths[body], steps[body])
         lines += [_run_line(c, runs[c], errors[c]) for c in runs if c.body == body]
     advices = [(b, a) for b, series in made.items() for a in _advices(series, runs, errors, truths[b], rates)]
     rows += _extrapolation_rows(made, runs, errors, truths, rates)
@@ -237,7 +235,7 @@ def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, 
 
 
 def _default_rows(
-    body: str, runs: Runs, errors: Mapping[Case, Mapping[str, float]], truths: Mapping[str, Truth],
+    body: str, errors: Mapping[Case, Mapping[str, float]], truths: Mapping[str, Truth],
     steps: Mapping[str, Mapping[int, float]],
 ) -> Iterator[Row]:  # fmt: skip
     """Whether the defaults keep what they claim, mesh and increments together."""

@@ -41,7 +41,10 @@ from finger3d.mechanics.model import Model
 from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
-from ._rows import Result, Row, at_least, at_most, columns
+from ._press import in_edges
+from ._rows import Result, Row, columns, listed
+
+judged = listed(__file__)
 
 SEED = 20261128
 SECTIONS, SOLIDS = 81, 19
@@ -51,8 +54,7 @@ MOST_S = 60.0
 """Seconds of a press after which its scene is left out."""
 IDLE = 0.5
 """Change over the tolerance up to which an effect is used in vain: beyond it, its error may reach the tolerance."""
-RIGHT, COVERED, COST = 0.98, 0.9, 1.5
-GOAL = "goal of finger3d for effects.auto"
+
 COLUMNS = "scene effect used needed number true_change judged_number judged_change"
 NEUTRAL: Mapping[str, Tree] = {
     "kinetic_friction": {"ratio": 1.0 - 1e-9},
@@ -163,21 +165,20 @@ def compare(name: str, scene: Scene, with_truth: bool) -> Compared:
     start = time.perf_counter()
     auto = finger3d.press(scene)
     seconds = time.perf_counter() - start
-    judged = auto.summary()["effects_auto"]
+    told = auto.summary()["effects_auto"]
     verdicts = []
     for effect in names:
         change, number, sure = _largest_change(without[effect], every)
-        found = judged["judged"].get(effect, {"change": 0.0, "number": ""})
+        found = told["judged"].get(effect, {"change": 0.0, "number": ""})
         verdicts.append(
-            Verdict(name, effect, effect in judged["used"], scene.tolerance_of_effects, change, number, sure,
+            Verdict(name, effect, effect in told["used"], scene.tolerance_of_effects, change, number, sure,
                     found["change"], found["number"])
         )  # fmt: skip
-    found = Compared(tuple(verdicts), (), seconds, seconds - judged["seconds"])
+    found = Compared(tuple(verdicts), (), seconds, seconds - told["seconds"])
     if not with_truth:
         return found
     finer = FINER["solid" if scene.domain == "solid" else "section"]
-    mesh = replace(scene.mesh, size_mm=finer * scene.mesh.size_mm, base_size_mm=finer * scene.mesh.base_size_mm)
-    truth = Pressed.of(replace(everything, mesh=mesh), with_free_strain=True)
+    truth = Pressed.of(in_edges(everything, finer), with_free_strain=True)
     return replace(found, shares=tuple(_errors_over_bars(auto, truth.numbers)))
 
 
@@ -260,22 +261,15 @@ def _rows(found: list[Compared], failed: int, quick: bool) -> Iterable[Row]:
     shares = [share for one in found for share in one.shares]
     ratios = [one.seconds / one.without_s for one in found if one.right]
     right = sum(one.right for one in found) / (len(found) + failed)
-    yield Row(
-        f"share of {len(found) + failed} scenes with the right set of effects, with {failed} that take over a minute "
-        f"or fail among the wrong ones; {len(verdicts)} effects", GOAL, RIGHT, right, 0.0, "a bound",
-        "verification" if quick else "statement", "at least",
-    )  # fmt: skip
-    yield at_least(f"share of {len(shares)} numbers whose truth lies within two total bars of mesh and model", GOAL,
-                   COVERED, float(np.mean(np.array(shares) <= 2.0)))  # fmt: skip
-    yield at_most(
-        f"time of a press over that without the judgement, median of the {len(ratios)} with the right effects",
-        GOAL, COST, float(np.median(ratios)), kind="statement")  # fmt: skip
+    row = judged("share-of-scenes", right, scenes=len(found) + failed, failed=failed, effects=len(verdicts))
+    yield replace(row, kind="verification" if quick else "statement")
+    yield judged("share-of-numbers", np.mean(np.array(shares) <= 2.0), count=len(shares))
+    yield judged("time-of-a-press", np.median(ratios), count=len(ratios))
     for effect, label in LABELS.items():
         here = [v for v in verdicts if v.effect == effect]
         missed, idle = (sum(not v.right and v.used == used for v in here) for used in (False, True))
-        text = f"{label}: needed in {sum(v.needed for v in here)} of {len(here)} scenes, missed in {missed}"
-        yield at_least(f"{text}, used in vain in {idle}; share decided rightly", GOAL, RIGHT,
-                       float(np.mean([v.right for v in here])), "that of the sets", "statement")  # fmt: skip
+        words = {"needed": sum(v.needed for v in here), "count": len(here), "missed": missed, "idle": idle}
+        yield judged("share-decided-rightly", np.mean([v.right for v in here]), label=label, **words)
 
 
 def _draw(figure: Any, verdicts: list[Verdict]) -> None:

@@ -16,12 +16,12 @@ from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import body, box, convergence, graded, held_at, mapped, rate
-from ._rows import Result, Row, exact_columns, zero
+from ._rows import Result, exact_columns, listed
+
+judged = listed(__file__)
 
 HEIGHT = 200.0  # a = 1 mm, E = 1 MPa
 AWAY = 0.9
-_SOURCE = "Johnson 1985, sec. 2.8; REFERENCES.md, 1.5"
-_TWO = "first order in the length of the corner element; 0.6 % measured at a/800, and a/400 must pass too"
 
 
 def pressures(h: float, nu: float, depth: float = 1e-3) -> tuple[Float, Float, Float]:
@@ -60,15 +60,11 @@ def run(quick: bool) -> Result:
     for nu in (0.3,) if quick else (0.3, 0.45):
         found = np.array([errors(h, nu) for h in sizes])
         _, worst, _, half = found[-1]
-        what = f"pressure up to 0.9 a over P/(pi sqrt(a^2 - x^2)), nu = {nu:g}, worst point, less 1"
-        rows.append(zero(what, _SOURCE, float(worst), 0.02, _TWO))
-        why = "the tolerance of the pressure, of which it is a mean"
-        what = f"share of the force within a/2, nu = {nu:g}"
-        rows.append(Row(what, "arcsin(1/2) 2/pi", 1 / 3, (1 + half) / 3, 0.02, why))
-        slope = rate(found[:, 0], found[:, 3])
-        why = "elements far from the corner do not shrink with h, and have an error of their own"
-        what = f"rate of that in h, nu = {nu:g}"
-        rows.append(Row(what, "first order in h", 1.0, slope, 0.15, why, measure="at least"))
+        rows += [
+            judged("pressure", worst, nu=nu),
+            judged("share-of-the-force", (1 + half) / 3, 1 / 3, nu=nu),
+            judged("rate-of-the-share", rate(found[:, 0], found[:, 3]), nu=nu),
+        ]
         curves[f"pressure up to 0.9 a, worst, nu = {nu:g}"] = found[:, 1]
         curves[f"force within a/2, nu = {nu:g}"] = found[:, 3]
         table += [(nu, *e) for e in found]

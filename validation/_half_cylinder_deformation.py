@@ -14,7 +14,9 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
 
 from ._paper import CASES, SHOWN, STRAIN, STRESS, Profile, fig9, half_cylinder, moved, pressed, said
-from ._rows import Result, Row, at_most, columns, together, zero
+from ._rows import Result, Row, columns, listed, together
+
+judged = listed(__file__)
 
 
 def _r5(quick: bool) -> Result:
@@ -39,13 +41,11 @@ def _r5(quick: bool) -> Result:
     for plane, nu in SHOWN:
         other = half_cylinder(nu, plane, size / 2.0)
         fine = Profile.of(other, pressed(other, 0.25)[-1]).force
-        what, own = f"force at 1 mm, N per mm, {plane}, nu = {nu:g}", found[plane, nu][2].force
-        source, why = "this code, edges half as long", "mesh: the corners of the base are singular"
-        rows.append(Row(what, source, fine, own, 0.004 if quick else 0.002, why))
+        allowed = 0.004 if quick else 0.002
+        rows.append(judged("force-by-finer-mesh", found[plane, nu][2].force, fine, allowed, plane=plane, nu=nu))
     problem, frame, profile = found[STRESS, 0.3]
     gap = np.abs(frame.state.gap[frame.state.status != 0]).max()
-    what = "distance of the contact from the plate, mm"
-    rows.append(zero(what, "Eq. 2", gap, 1e-8, "solver tolerance"))
+    rows.append(judged("distance-from-the-plate", gap))
     for plane in (STRESS, STRAIN):
         for what, key in (("force", "force"), ("contact half-width at rest", "a"), ("stick half-width", "c")):
             low, high = (getattr(found[plane, nu][2], key) for nu in (0.3, 0.49))
@@ -114,8 +114,7 @@ def _sensitivity(widths: dict[Any, tuple[float, ...]]) -> Row:
     """By how much mu moves the width, beside what nu does."""
     by_mu = np.ptp([widths[STRAIN, 0.49, mu][1] for mu in SHOWN_MU])
     by_nu = np.ptp([widths[STRAIN, nu, 0.25][1] for nu in NUS])
-    return at_most("deformed width in plane strain: what mu = .06 to 1 moves over what nu = 0 to .5 moves", "this code",
-                   0.5, float(by_mu / by_nu), "79 mm tells nu rather than mu", "sensitivity")  # fmt: skip
+    return judged("width-by-mu-over-that-by-nu", by_mu / by_nu)
 
 
 def _deformed(axes: Any, problem: Problem, frame: StepResult, lw: float) -> None:

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, Model
 from finger3d.objects import Cylinder, RigidObject
 
 from . import _press
@@ -47,18 +46,17 @@ def loading(steps: int, height: float = DEPTH_OF_BLOCK, radius: float = RADIUS) 
 
 def on_block(
     rigid: RigidObject, material: Isotropic, points: float, legs: tuple[Leg, ...], height: float, base: float = 0.25,
-    width: float = 1.0, **fields: Any,
+    **fields: Any,
 ) -> Model:  # fmt: skip
-    """An object on a block twice as long as high, in plane strain unless `fields` say otherwise.
+    """An object on a block 1 mm wide and twice as long as high, in plane strain unless `fields` say otherwise.
 
     Parameters
     ----------
     points : contact points to a millimetre
     base : longest edge, over the height
     """
-    block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=width)
-    mesh = MeshOptions(1.0 / points, base * height, "swept")
-    return Model(block, material, mesh, legs, object=rigid, **{"domain": "plane-strain", **fields})
+    edges, more = (1.0 / points, base * height), {"domain": "plane-strain", "object": rigid, **fields}
+    return _press.block_model((height, height, 1.0), material, edges, legs, **more)
 
 
 def line(nu: float, points: float, legs: tuple[Leg, ...], height: float = DEPTH_OF_BLOCK) -> Problem:

@@ -40,8 +40,11 @@ from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
 from ._paper import moved
-from ._rows import GOAL, ROBUST, Result, Row, Settled, at_least, at_most, grouped, of_records, settled
+from ._press import block_model
+from ._rows import Result, Row, Settled, grouped, listed, of_records, settled
 from .triangulated_objects import of_trimesh
+
+judged = listed(__file__)
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
@@ -113,11 +116,8 @@ def resolved_scene(number: int) -> Model:
 
 def ball(radius_mm: float, depth_mm: float) -> Model:
     """Return the press of a ball into the middle of a block on the mesh that is chosen by default."""
-    design = designs()["block"](half_length_mm=6.0, height_mm=HEIGHT, width_mm=12.0)
-    model = Model(
-        design, Isotropic(1.0, 0.45), MeshOptions(1.0, 1.0, "swept"), (Leg(depth_mm, steps=4),),
-        object=Sphere(radius_mm=radius_mm), friction=Coulomb(0.5),
-    )  # fmt: skip
+    more = {"object": Sphere(radius_mm=radius_mm), "friction": Coulomb(0.5)}
+    model = block_model((6.0, HEIGHT, 12.0), Isotropic(1.0, 0.45), (1.0, 1.0), (Leg(depth_mm, steps=4),), **more)
     return Effect().apply(_by_default(model))
 
 
@@ -271,27 +271,19 @@ def run(quick: bool) -> Result:
     return Result(rows, table, lambda figure: _draw(figure, table), settled(counts))
 
 
-def _bound(what: str, most: float, got: float, reason: str, reference: str = ROBUST) -> Row:
-    return at_most(what, reference, float(most), float(got), reason)
-
-
 def _settling(found: Sequence[Found]) -> list[Row]:
     """How many scenes settle, at what cost, and whether a cell is inverted."""
     here = f"{len(found)} random scenes"
     unsettled = [f for f in found if not f.settled]
     increments = sum(f.increments for f in found)
     return [
-        _bound(f"{here}: share unsettled", 0.02, len(unsettled) / len(found), "sharp corners that fold without end"),
-        _bound(f"{here}: unsettled without cause or cure", 0, sum(not _cured(f) for f in unsettled), "none"),
-        at_most(f"{here}: unsettled where no sharp edge of the finger folds", GOAL, 0.0,
-            float(sum(not f.folds for f in unsettled)), "none", "statement"),
-        _bound(f"{here}: scenes with a point inside the object that is not in contact", 0,
-               sum(not f.outside for f in found), "none"),
-        at_least(f"{here}: smallest ratio of volumes at any quadrature point", ROBUST, 0.0,
-            min(f.least_volume for f in found), "no cell inverted"),
-        _bound(f"{here}: factorisations of an increment", 3.0, sum(f.factorizations for f in found) / increments, GOAL,
-               GOAL),
-    ]  # fmt: skip
+        judged("share-unsettled", len(unsettled) / len(found), here=here),
+        judged("unsettled-without-cure", sum(not _cured(f) for f in unsettled), here=here),
+        judged("unsettled-without-fold", sum(not f.folds for f in unsettled), here=here),
+        judged("point-inside", sum(not f.outside for f in found), here=here),
+        judged("least-ratio-of-volumes", min(f.least_volume for f in found), here=here),
+        judged("factorisations", sum(f.factorizations for f in found) / increments, here=here),
+    ]
 
 
 def _cured(found: Found) -> bool:
@@ -305,22 +297,18 @@ def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> Iterator[R
         for kind, solid in (("sections", False), ("solids", True)):
             here = [f for _, model, f in found[mesh] if (model.domain == "solid") == solid]
             if here:
-                yield at_most(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
-                              max(f.penetration for f in here), "largest at sharp edges of finger and object",
-                              "statement")  # fmt: skip
-    what = "on default meshes, deepest away from sharp edges: largest penetration over the depth"
+                yield judged("penetration", max(f.penetration for f in here), count=len(here), kind=kind, mesh=mesh)
     for kind, some in (("sections", found["default"]), ("solids under balls", found["balls"])):
         smooth = [
             f for _, model, f in some if not f.at_sharp_edge and (model.domain == "solid") == (kind != "sections")
         ]
         if smooth:
-            yield _bound(f"{len(smooth)} {kind} {what}", 0.01, max(f.penetration for f in smooth), "a hundredth",
-                         GOAL)  # fmt: skip
-    ended = [f for *_, f in found["default"] if not f.settled]
-    here = f"{len(found['default'])} presses on default meshes"
-    yield _bound(f"{here}: share that ends early", 0.02, len(ended) / len(found["default"]),
-                 "the finer, the sooner sharp edges fold", GOAL)  # fmt: skip
-    yield _bound(f"{here}: ends early without cause or cure", 0, sum(not _cured(f) for f in ended), "none")
+            yield judged(
+                "penetration-away-from-edges", max(f.penetration for f in smooth), count=len(smooth), kind=kind
+            )
+    ended, count = [f for *_, f in found["default"] if not f.settled], len(found["default"])
+    yield judged("share-that-ends-early", len(ended) / count, count=count)
+    yield judged("ends-early-without-cure", sum(not _cured(f) for f in ended), count=count)
 
 
 def _table(found: dict[str, list[tuple[int, Model, Found]]]) -> dict[str, list[Any]]:

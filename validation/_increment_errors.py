@@ -19,15 +19,17 @@ from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Gauge, Leg, Model
+from finger3d.mechanics.model import Leg, Model
 from finger3d.objects import Cylinder, Sphere
 
 from ._common import ticks_at
 from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, STRESS, Profile, fig9, half_cylinder, line_r5, said, strains
-from ._press import changed, in_increments, under
-from ._rows import Result, Row, at_least, at_most, columns, together
+from ._press import PAPER_GAUGE, changed, in_increments, under
+from ._rows import Result, Row, columns, listed, together
+
+judged = listed(__file__)
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.49))
 COUNTS_SIZE = (1, 2, 5, 10, 20, 40, 80, 160, 320)
@@ -79,10 +81,8 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: lis
         said("increments-small-enough", off[10][k], name=NAMES[k], here=here)
         for k in (0, 1, 3, 4)
     ]  # fmt: skip
-    rate = float(np.log(off[5][3] / off[counts[-1]][3]) / np.log(counts[-1] / 5))
-    what = f"rate at which the dissipation settles, 5 to {counts[-1]} increments, {here}"
-    reason = "about 1; c moves from point to point"
-    return [*rows, at_least(what, "first order at least", 0.8, rate, reason, "sensitivity")]
+    rate = np.log(off[5][3] / off[counts[-1]][3]) / np.log(counts[-1] / 5)
+    return [*rows, judged("rate-of-the-dissipation", rate, most=counts[-1], here=here)]
 
 
 def _draw_size(figure: Any, found: dict[Any, np.ndarray], counts: list[int]) -> None:
@@ -104,8 +104,8 @@ ROUND_OFF = 1e-9
 PLAIN = 160
 """Plain increments that twenty are compared with."""
 QUANTITIES = ("friction sum", "stick area", "gauge", "dissipation", "energy balance")
-GAUGE = Gauge("g", 36.0, 40.0, angle=float(np.deg2rad(30.0)))
-ORDER = "second order: 4"
+
+
 BAR = Cylinder(radius_mm=20.0, axis="z")
 
 
@@ -121,12 +121,12 @@ class Press:
 
 def presses(quick: bool) -> Iterator[Press]:
     """All presses; quick ones on coarse meshes."""
-    section = fig9(0.49, STRAIN, 2.0 if quick else 1.0, [GAUGE]).model
+    section = fig9(0.49, STRAIN, 2.0 if quick else 1.0, [PAPER_GAUGE]).model
     on_bar = replace(section, object=BAR, legs=(Leg(6.0),))
     few = 320 if quick else 640
     yield Press("section on a bar", on_bar, 0.5, few)
     yield Press("bar is released", replace(on_bar, legs=(Leg(6.0), Leg(2.0))), 0.5, few)
-    solid = fig9(0.49, "solid", 5.0 if quick else 2.5, [GAUGE]).model
+    solid = fig9(0.49, "solid", 5.0 if quick else 2.5, [PAPER_GAUGE]).model
     yield Press("solid on a plane", solid, 0.5, few)
     if not quick:
         yield Press("bar slides", replace(on_bar, legs=(Leg(5.0), Leg(5.0, slide_x_mm=2.0))), 0.5, few)
@@ -201,23 +201,16 @@ def _rows(counts: tuple[int, ...], own: dict[str, np.ndarray], plain: dict[str, 
     few, many = counts[0], counts[-1]
     falls = np.array([_fall(errors) for errors in own.values()])
     for name, fall in zip(own, falls, strict=True):
-        what = f"fall of errors in a halving, median over quantities, {name}, {few} to {many} increments"
-        yield at_least(what, ORDER, 3.3, float(np.nanmedian(fall)), "points close one by one", "statement")
-    every = f"all presses, {few} to {many} increments"
-    what = f"fall of errors in a halving, median over quantities and presses, {every}"
-    yield at_least(what, ORDER, 3.3, float(np.nanmedian(falls)), "points close one by one")
+        yield judged("fall-of-errors-of-a-press", np.nanmedian(fall), name=name, few=few, many=many)
+    yield judged("fall-of-all-errors", np.nanmedian(falls), few=few, many=many)
     for name, got in _medians(falls):
-        what = f"fall of the error of the {name} in a halving, median over {every}"
-        yield at_least(what, ORDER, 3.3, got, "points close one by one", "statement")
+        yield judged("fall-of-the-error-of-a-quantity", got, name=name, few=few, many=many)
     twenty = np.array([errors[1, :-1] for errors in own.values()])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = twenty / np.array(list(plain.values()))[:, :-1]
     for name, got in _medians(share):
-        what = f"error of the {name} in 20 increments over that in {PLAIN} plain ones, median over presses"
-        yield at_most(what, "eight times as many", 1.0, got, "0/0 is left out", "statement")
-    what = f"error in 20 increments over that in {PLAIN} plain ones, median over quantities and presses"
-    got = float(np.nanmedian(share))
-    yield at_most(what, "goal of finger3d", 1.0, got, "eight times as many", "statement")
+        yield judged("error-over-that-of-plain-increments", got, name=name, plain=PLAIN)
+    yield judged("errors-over-those-of-plain-increments", np.nanmedian(share), plain=PLAIN)
 
 
 def _draw_orders(

@@ -24,12 +24,12 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.step_halving import errors_of_runs, march_automatic
-from finger3d.mechanics.model import Gauge, Leg
+from finger3d.mechanics.model import Leg
 
 from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, STRESS, fig9, half_cylinder
-from ._press import changed, in_increments, under
+from ._press import PAPER_GAUGE, changed, in_increments, under
 from ._rows import Result, Row, at_least, columns, words, zero
 
 MUS = (0.06, 0.25, 0.5, 1.0)
@@ -37,7 +37,7 @@ GRID_NU, GRID_MU = (0.0, 0.3, 0.49, 0.5), (0.0, 0.06, 0.25, 1.0, 3.0, 10.0, 1e3,
 STATIONS = (7, 320)
 FORCES = ("normal_force_N", "friction_sum_N")
 AREAS, ENERGIES = ("contact_area_mm2", "stick_area_mm2"), ("external_work_mJ", "dissipation_mJ")
-GAUGE = Gauge("g", 36.0, 40.0, angle=float(np.deg2rad(30.0)))
+
 PRESS_SLIDE_RELEASE = (Leg(10.0), Leg(10.0, slide_x_mm=3.0), Leg(4.0, slide_x_mm=3.0))
 HALF = "half cylinder"
 PLAIN, OWN = "plain", "finger3d's"
@@ -52,7 +52,7 @@ def run(quick: bool) -> Result:
     """Quick: one coarse section, at most 160 increments, and a small grid."""
     counts = (10, 40, 160) if quick else (10, 40, 160, 640)
     sizes = (4.0,) if quick else (2.0, 1.0)
-    sections = {f"Fig. 9, {size:g} mm": fig9(0.49, STRAIN, size, [GAUGE]) for size in sizes}
+    sections = {f"Fig. 9, {size:g} mm": fig9(0.49, STRAIN, size, [PAPER_GAUGE]) for size in sizes}
     if not quick:
         sections[HALF] = half_cylinder(0.3, STRESS, 0.1)
     errors, automatic = {}, []
@@ -81,7 +81,7 @@ def _under(section: Problem, mu: float, legs: Sequence[Leg], steps: int | Litera
 
 def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     numbers = press_numbers(problem, step)
-    return {name: numbers[name] for name in (*FORCES, *ENERGIES, f"gauge_{GAUGE.name}") if name in numbers}
+    return {name: numbers[name] for name in (*FORCES, *ENERGIES, f"gauge_{PAPER_GAUGE.name}") if name in numbers}
 
 
 def _errors(exact: dict[str, float], numbers: dict[str, float]) -> dict[str, float]:
@@ -128,7 +128,7 @@ def _grid(quick: bool) -> list[tuple[Any, ...]]:
     lines = []
     size, nus, mus = (6.0, (0.49,), (0.25, 1e6)) if quick else (4.0, GRID_NU, GRID_MU)
     for nu in nus:
-        section = build(replace(fig9(nu, STRAIN, size, [GAUGE]).model, legs=PRESS_SLIDE_RELEASE))
+        section = build(replace(fig9(nu, STRAIN, size, [PAPER_GAUGE]).model, legs=PRESS_SLIDE_RELEASE))
         for mu in mus:
             ends = []
             for count in (3, 20) if quick else STATIONS:

@@ -17,7 +17,7 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design, designs
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
@@ -39,6 +39,21 @@ def fig9_model(nu: float, size: float, base: float, domain: Domain = "solid", **
     return Model(material=Isotropic(1.0, nu), mesh=mesh, domain=domain, **own | fields)
 
 
+def block_model(
+    size_mm: Sequence[float], material: Isotropic, edges: tuple[float, float], legs: tuple[Leg, ...], **fields: Any
+) -> Model:
+    """Return a model of a block on a structured mesh.
+
+    Parameters
+    ----------
+    size_mm : half its length, height and width
+    edges : lengths at the contact and far from it, mm
+    """
+    half_length, height, width = size_mm
+    block = designs()["block"](half_length_mm=half_length, height_mm=height, width_mm=width)
+    return Model(block, material, MeshOptions(*edges, "swept"), legs, **fields)
+
+
 def block_tables(size_mm: Sequence[float], E_MPa: float, nu: float, edges: Sequence[float], **tables: Any) -> Tree:
     """Return the tables of a block on a structured mesh, and others.
 
@@ -53,6 +68,10 @@ def block_tables(size_mm: Sequence[float], E_MPa: float, nu: float, edges: Seque
         "mesh": {"mesher": "swept", "size_mm": edges[0], "base_size_mm": edges[1]},
         **tables,
     }
+
+
+PAPER_GAUGE = Gauge("g", 36.0, 40.0, angle=math.radians(30.0))
+"""The gauge of the paper, at a point; its depth is not told."""
 
 
 def paper_gauges(length_mm: float, y_mm: float = 40.0) -> tuple[Gauge, Gauge]:
@@ -78,6 +97,11 @@ def converged(problem: Problem, workspace: Workspace | None = None) -> list[Step
     if not steps[-1].outcome.ok:
         raise AssertionError(f"mu = {problem.model.friction.mu:g}, {steps[-1].target}: {steps[-1].outcome}")
     return steps
+
+
+def measured(problem: Problem) -> list[Tree]:
+    """Return the numbers after every increment of a press, all of which must converge."""
+    return [measure(problem.points, step) for step in converged(problem)]
 
 
 def in_increments(legs: Sequence[Leg], count: int | Literal["auto"]) -> tuple[Leg, ...]:

@@ -106,13 +106,18 @@ def zero(what: str, reference: str, got: float, tolerance: float, reason: str, k
     return Row(what, reference, 0.0, got, tolerance, reason, kind, "absolute")
 
 
+def given(file: str) -> Tree:
+    """Return the data of a study, a TOML file beside it."""
+    return tomllib.loads(Path(file).with_suffix(".toml").read_text("utf-8"))
+
+
 def listed(file: str) -> Callable[..., Row]:
-    """Return a function that makes the rows which the data of a study, a TOML file beside it, list by name.
+    """Return a function that makes the rows which the data of a study list by name.
 
     It takes the name, the number found, what is wanted and the tolerance where these are not listed, and by keyword the
     words that stand in braces in the texts.
     """
-    rows: Tree = tomllib.loads(Path(file).with_suffix(".toml").read_text("utf-8"))["row"]
+    rows: Tree = given(file)["row"]
 
     def judged(
         name: str, got: float, /, wanted: float | None = None, tolerance: float | None = None, **words: Any

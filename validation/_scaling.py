@@ -48,18 +48,13 @@ class Watch(Progress):
         self.now = "mesh"
 
     def stage(self, text: str) -> None:
-        """A stage of the job."""
-        self._turn(text)
-
-    def say(self, text: str) -> None:
-        """A part of the build."""
-        self._turn(text)
-
-    def _turn(self, text: str) -> None:
+        """A stage of the job, or a part of the build."""
         following = self._STARTS.get(text.split(" ")[0].rstrip(","))
         if following and following != self.now:
             self.close()
             self.now = following
+
+    say = stage
 
     def close(self) -> None:
         """End of a stage: its peak is kept, and the next begins at what is in use."""

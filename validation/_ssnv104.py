@@ -21,14 +21,13 @@ from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import Body, ball_numbers, body, box, contact_axis, ellipse, graded, held_at, mapped, rate
-from ._rows import Result, Row, exact_columns
+from ._rows import Result, exact_columns, listed
+
+judged = listed(__file__)
 
 R, E, NU = 50.0, 20_000.0, 0.3
 MODULUS = E / (1.0 - NU**2)
 DEPTHS = np.linspace(1.0, 2.0, 12)  # mm, half the approach
-_ASTER = "Code_Aster V6.04.104; REFERENCES.md, 6.2"
-_TATARA = "Hertz 1882 with Tatara 1991; REFERENCES.md, 1.8"
-_ONE = "nine points to a: 0.7 % or less measured"
 
 
 def eighth(p: Float) -> Float:
@@ -87,24 +86,19 @@ def run(quick: bool) -> Result:
     published = 2.0 / np.pi * MODULUS * np.sqrt(DEPTHS[-1] / R)
     wanted = 1.5 * force_at(true[-1]) / (np.pi * true[-1] ** 2)
     from_force = float((6.0 * force[-1] * MODULUS**2 / (np.pi**3 * R**2)) ** (1.0 / 3.0))
-    aster = "the published value is for half-spaces; Tatara 1991 gives 4.0 % more, and 0.5 % is left for the mesh"
     rows = [
-        Row("peak of half-spaces at 4 mm (MPa)", _ASTER, 2798.3, float(published), 1e-4, "the published digits"),
-        Row("peak pressure at 4 mm, from the force (MPa)", _ASTER, 2798.3, from_force, 0.045, aster),
-        Row("peak pressure at 4 mm, from the force (MPa)", _TATARA, float(wanted), from_force, 0.01, _ONE),
+        judged("peak-of-half-spaces", published),
+        judged("peak-beside-the-published", from_force),
+        judged("peak-beside-tatara", from_force, wanted),
     ]
     if not quick:  # the line of p^2 needs 9 points to a
-        what = "peak pressure at 4 mm, from p^2 over r^2 (MPa)"
-        rows.append(Row(what, _TATARA, float(wanted), float(peak[-1]), 0.01, _ONE))
-    for what, source, radius in (
-        ("force over Tatara's, mean of 12 depths", _TATARA, true),
-        ("P/P_Hertz(a), mean of 12 depths", "Johnson 1985, sec. 4.2; REFERENCES.md, 1.1", a),
-    ):
-        rows.append(Row(what, source, 1.0, float(np.mean(force / force_at(radius))), 0.01, _ONE))
+        rows.append(judged("peak-from-squares", peak[-1], wanted))
     errors = [float(np.sqrt(np.mean(level[:, 3] ** 2))) for level in levels]
-    why = "12 depths sample the position of the edge between points; a higher rate passes"
-    got = rate(1.0 / np.array(counts), errors)
-    rows.append(Row("rate of the pressure in L2", "square-root edge", 1.0, got, 0.15, why, measure="at least"))
+    rows += [
+        judged("force-over-tatara", np.mean(force / force_at(true))),
+        judged("force-over-hertz", np.mean(force / force_at(a))),
+        judged("rate-of-the-pressure", rate(1.0 / np.array(counts), errors)),
+    ]
     names = "points_per_a approach_mm force_N contact_radius_mm peak_MPa pressure_L2_error"
     flat = [
         (n, 2.0 * d, *v) for n, level in zip(counts, levels, strict=True) for d, v in zip(DEPTHS, level, strict=True)

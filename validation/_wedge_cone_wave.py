@@ -40,15 +40,14 @@ from ._common import (
     rate,
 )
 from ._halfplane import CANDIDATES, on_block
-from ._rows import Result, Row, exact_columns
+from ._rows import Result, exact_columns, listed
+
+judged = listed(__file__)
 
 NU, SLOPE, AMPLITUDE = 0.3, 0.01, 1e-3
 MODULUS = 1.0 / (1.0 - NU**2)
 PEAK = np.pi * MODULUS * AMPLITUDE  # p* for a wavelength of 1 mm
-_WESTERGAARD = "Westergaard 1939; REFERENCES.md, 1.6"
-_JOHNSON = "Johnson 1985, sec. 5.2; REFERENCES.md, 1.4"
-_ONE = "second order in the point spacing; 0.07 % or less measured, and coarse meshes must pass too"
-_WAVE = "second order in the point spacing; 0.01 % or less measured, and coarse meshes must pass too"
+
 Errors = Float  # (depths, 2): force over the closed form at equal a, less 1; L2 error of the pressure, nan if not taken
 
 
@@ -149,40 +148,34 @@ def full_contact(count: int) -> float:
     return float(2.0 * (f @ (1.0 - 2.0 * square)) / half.surface.area.sum() / PEAK)
 
 
-EDGES = {"wedge, plane strain": 0.5, "wave, plane strain": 1.0}
-"""Rates of the pressure in L2, where it is taken."""
+EDGES = {"wedge, plane strain": (0.5, "logarithm at the tip"), "wave, plane strain": (1.0, "square-root edge")}
+"""Rates of the pressure in L2, where it is taken, and what they are due to."""
 
 
 def run(quick: bool) -> Result:
     """Three sizes of each."""
     growth, radii = (2.2, (3, 4, 5)) if quick else (1.6, (4, 6, 8))
-    studies: dict[str, tuple[Any, tuple[int, ...], str, str]] = {
-        "wedge, plane strain": (wedge, (5, 10, 20) if quick else (5, 10, 20, 40), _JOHNSON, _ONE),
-        "cone, 3D": (lambda n: cone(n, growth), radii, "Sneddon 1965; REFERENCES.md, 1.4", _ONE),
-        "wave, plane strain": (wave, (10, 20, 40) if quick else (20, 40, 80), _WESTERGAARD, _WAVE),
+    wedges, waves = ((5, 10, 20), (10, 20, 40)) if quick else ((5, 10, 20, 40), (20, 40, 80))
+    studies: dict[str, tuple[Any, tuple[int, ...], str, float]] = {
+        "wedge, plane strain": (wedge, wedges, "Johnson 1985, sec. 5.2; REFERENCES.md, 1.4", 0.07),
+        "cone, 3D": (lambda n: cone(n, growth), radii, "Sneddon 1965; REFERENCES.md, 1.4", 0.07),
+        "wave, plane strain": (wave, waves, "Westergaard 1939; REFERENCES.md, 1.6", 0.01),
     }
     rows, table, curves = [], [], {}
-    for name, (measure, counts, source, reason) in studies.items():
+    for name, (measure, counts, source, seen) in studies.items():
         levels = [measure(n) for n in counts]
         sizes = 1.0 / np.array(counts)
-        got = 1.0 + float(levels[-1][:, 0].mean())
-        what = f"force over the closed form at equal a, {name}, mean of depths"
-        rows.append(Row(what, source, 1.0, got, 0.01, reason))
+        rows.append(judged("force", 1.0 + levels[-1][:, 0].mean(), name=name, source=source, seen=seen))
         errors = np.sqrt([np.mean(e**2, axis=0) for e in levels])
         curves[name] = sizes, errors
         table += [(name, n, *e) for n, e in zip(counts, errors, strict=True)]
-        why = "the depths sample the position of the edge between two points; a higher rate passes"
-        what, slope = f"rate of the force at equal a, {name}", rate(sizes, errors[:, 0])
-        rows.append(Row(what, "h^2, as the force", 2.0, slope, 0.2, why, measure="at least"))
+        rows.append(judged("rate-of-the-force", rate(sizes, errors[:, 0]), name=name))
         if name in EDGES:
-            what, slope = f"rate of the pressure in L2, {name}", rate(sizes, errors[:, 1])
-            kind = "logarithm at the tip" if EDGES[name] < 1.0 else "square-root edge"
-            rows.append(Row(what, kind, EDGES[name], slope, 0.1, why, measure="at least"))
+            theory, cause = EDGES[name]
+            rows.append(judged("rate-of-the-pressure", rate(sizes, errors[:, 1]), theory, name=name, cause=cause))
     count = 10 if quick else 40
-    what = f"force over the closed form at equal a, wedge, the product's own path, {count} points to a, mean of depths"
-    rows.append(Row(what, _JOHNSON, 1.0, own_path(count), 0.01, _ONE))
-    got = full_contact(20 if quick else 40)
-    rows.append(Row("amplitude of the pressure over p*, all touching, wave", _WESTERGAARD, 1.0, got, 0.01, _WAVE))
+    rows.append(judged("force-of-own-path", own_path(count), count=count))
+    rows.append(judged("amplitude-of-the-pressure", full_contact(20 if quick else 40)))
     names = "case points force_rms_error pressure_L2_error"
     return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
@@ -194,5 +187,5 @@ def draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:
     for axes, (name, (sizes, errors)) in zip(figure.subplots(1, 3), curves.items(), strict=True):
         convergence(axes, sizes, {"force at equal a": errors[:, 0]}, 2.0, *labels)
         if name in EDGES:
-            convergence(axes, sizes, {"pressure, L2": errors[:, 1]}, EDGES[name], *labels)
+            convergence(axes, sizes, {"pressure, L2": errors[:, 1]}, EDGES[name][0], *labels)
         axes.set_title(name)

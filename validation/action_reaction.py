@@ -30,10 +30,9 @@ from finger3d.mechanics.model import Leg
 
 from ._common import convergence, rate
 from ._press import changed, fig9_model
-from ._rows import Result, Row, exact_columns, zero
+from ._rows import Result, Row, exact_columns, listed
 
-_ALWAYS = "balance of the whole body; REFERENCES.md, 7.1"
-_ROUND = "round-off; 2e-13 or less measured"
+judged = listed(__file__)
 SIZES = {"plane-strain": 2.0, "solid": 8.0}
 
 
@@ -109,7 +108,7 @@ def run(quick: bool) -> Result:
             ("loss", "energy that friction gives back at a point in an increment, over the most it takes"),
             ("net", "net friction of the press before the slide, over its force"),
         ):
-            rows.append(zero(f"{what}, {name}, largest", _ALWAYS, worst[key], 1e-10, _ROUND))
+            rows.append(judged("imbalance", worst[key], what=what, name=name))
         rows += _energy(problem, f"{name}, nu = {nu:g}", curves, table)
     names = "case mu increments_per_leg work_less_stored_and_lost"
     return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
@@ -123,17 +122,11 @@ def _energy(problem: Problem, name: str, curves: Any, table: list[tuple[Any, ...
         table += [(name, mu, n, e) for n, e in zip(counts, found, strict=True)]
         kind = f"{name}, mu = {mu:g}"
         if mu == 0.0:
-            worst = float(np.abs(found).max())
-            what = f"work less stored and lost, over the work, {kind}, {counts[0]} to {counts[-1]} increments, largest"
-            yield zero(what, _ALWAYS, worst, 1e-10, "round-off")
+            yield judged("work-without-friction", np.abs(found).max(), kind=kind, few=counts[0], many=counts[-1])
             continue
-        what, kept = f"work over stored and lost, {kind}, {counts[-1]} increments a leg", 1.0 / (1.0 - found[-1])
-        yield Row(what, _ALWAYS, 1.0, kept, 1e-3, "second order; 0.03 % or less measured with so many")
-        why = "points change state within an increment; more than the first order is seen"
+        yield judged("work-over-stored-and-lost", 1.0 / (1.0 - found[-1]), kind=kind, many=counts[-1])
         curves[kind] = steps, np.abs(found)
-        got = rate(steps[-3:], found[-3:])
-        source = "friction under the mean normal force"
-        yield Row(f"rate of the work's balance, {kind}", source, 2.0, got, 0.7, why, measure="at least")
+        yield judged("rate-of-the-balance", rate(steps[-3:], found[-3:]), kind=kind)
 
 
 def draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:

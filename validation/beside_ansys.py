@@ -18,68 +18,30 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Tree
 from finger3d.analyses.press import press
 from finger3d.analyses.result import PressResult
 
 from ._press import block_tables
-from ._rows import Result, Row, at_most, columns
+from ._rows import Result, Row, columns, given, listed
 
-SOURCE = "ANSYS 2025 R2, irisxu02/gelsight_ansys_sim; REFERENCES.md, 6.6"
-KRATOS = "Kratos, dokkev/fingertip-design-framework; REFERENCES.md, 6.6"
-THEIRS = 0.09
-"""Largest error of a force that the authors of the ANSYS scenes give."""
-HOUR = 3600.0
+judged = listed(__file__)
+
 PRESS = 4
 """Increments of a press before a slide."""
 
 
-@dataclass(frozen=True)
-class Scene:
-    """A published press.
-
-    Attributes
-    ----------
-    size_mm : edges at the contact; a tenth or less of its width
-    numbers : published number and how it is read from a press, by what it is
-    seconds_there : published time, s; None if there is none
-    """
-
-    name: str
-    object: dict[str, Any]
-    legs: list[dict[str, Any]]
-    mu: float
-    size_mm: float
-    numbers: dict[str, tuple[float, Callable[[PressResult], float]]]
-    seconds_there: float | None
-    source: str = SOURCE
-
-    def tables(self, coarser: float) -> dict[str, Any]:
-        """Return the tables of the scene, with edges longer by a factor."""
-        size = coarser * self.size_mm
-        more = {"object": self.object, "friction": {"mu": self.mu}, "press": {"leg": self.legs}}
-        return block_tables((12.625, 4.0, 20.75), 0.1, 0.49, (size, min(4.0 * size, 2.5)), **more)
-
-
-def _force(result: PressResult) -> float:
-    return result.last.normal_force_N
-
-
-def _largest_pull(result: PressResult) -> float:
-    return max(abs(step.force_x_N) for step in result.steps)
+GIVEN = given(__file__)
+"""Published presses: tables of the scene, edges at the contact, a tenth or less of its width, and numbers by what they
+are, each with the way in which it is read from a press; and the half cylinder on a section."""
 
 
 def _pull(result: PressResult) -> float:
     return float(np.hypot(result.last.force_x_N, result.last.force_z_N))
-
-
-def _depth(result: PressResult) -> float:
-    """Depth at the end of the press, before the slide, which lowers the object."""
-    return result.steps[PRESS - 1].depth_mm
 
 
 def _sliding(result: PressResult) -> float:
@@ -96,75 +58,46 @@ def _ratio_at(slide_mm: float) -> Callable[[PressResult], float]:
     return ratio
 
 
-def _slid(force_N: float, slide: dict[str, float], steps: int) -> list[dict[str, Any]]:
-    return [{"force_N": force_N, "steps": PRESS}, {"force_N": force_N, **slide, "steps": steps}]
+READ: dict[str, Callable[[PressResult], float]] = {
+    "force": lambda result: result.last.normal_force_N,
+    "force after the press": lambda result: result.steps[PRESS - 1].normal_force_N,
+    "largest pull": lambda result: max(abs(step.force_x_N) for step in result.steps),
+    "pull": _pull,
+    "depth before the slide": lambda result: result.steps[PRESS - 1].depth_mm,
+    "ratio at .4 mm": _ratio_at(0.4),
+    "ratio at 1.1 mm": _ratio_at(1.1),
+    "sliding": _sliding,
+}
 
 
-def _sphere(radius_mm: float) -> dict[str, Any]:
-    return {"shape": "sphere", "radius_mm": radius_mm}
-
-
-TWO_N = {"hemisphere R 50": (_sphere(50.0), 0.9, 0.725, 4.9), "hemisphere R 10": (_sphere(10.0), 0.6, 0.783, 6.0),
-         "cylinder R 50": ({"shape": "cylinder", "radius_mm": 50.0}, 1.0, 0.701, 1.4)}  # fmt: skip
-
-SCENES = (
-    Scene("ball R 3, pressed .8 mm", _sphere(3.0), [{"depth_mm": 0.8, "steps": 6}], 0.5, 0.35,
-          {"normal force, N": (0.36087, _force)}, 130.0),
-    Scene("hemisphere R 50, .2266 mm deep, slid 2 mm", _sphere(50.0),
-          [{"depth_mm": 0.2266, "steps": PRESS}, {"depth_mm": 0.2266, "slide_x_mm": 2.0, "steps": 16}], 0.5, 0.9,
-          {"largest tangential force, N": (0.237, _largest_pull),
-           "normal force after the press, N": (0.502, lambda result: result.steps[PRESS - 1].normal_force_N)}, None),
-    *(Scene(f"{name}, 2 N, slid 2 mm", shape, _slid(2.0, {"slide_x_mm": 2.0}, 16), 0.35, size,
-            {"tangential force, N": (force, _pull)}, hours * HOUR)
-      for name, (shape, size, force, hours) in TWO_N.items()),
-    Scene("cylinder of 100 mm diameter, 4 N, slid 1.1 mm along its axis", {"shape": "cylinder", "radius_mm": 50.0},
-          _slid(4.0, {"slide_z_mm": 1.1}, 11), 0.6, 1.1,
-          {"depth, mm": (0.34, _depth), "tangential over normal force at .4 mm": (0.20, _ratio_at(0.4)),
-           "tangential over normal force at 1.1 mm": (0.40, _ratio_at(1.1)),
-           "share of the points that slide": (1.0 / 3.0, _sliding)}, 12.0 * HOUR),
-    Scene("plane, 5 N, slid 1 mm", {"shape": "plane"}, _slid(5.0, {"slide_x_mm": 1.0}, 10), 0.45, 1.2,
-          {"depth, mm": (0.093, _depth), "tangential force, N": (2.15, _pull),
-           "share of the points that slide": (1488.0 / 4080.0, _sliding)}, 12.0 * HOUR),
-)  # fmt: skip
-KRATOS_FORCES = (0.397, 0.466, 0.500)
-
-
-def _kratos(coarser: float) -> dict[str, Any]:
-    return {
-        "finger": {"geometry": "block", "half_length_mm": 5.0, "height_mm": 5.0, "width_mm": 1.0},
-        "material": {"E_MPa": 1.0, "nu": 0.49},
-        "object": {"shape": "cylinder", "radius_mm": 2.0},
-        "press": {"depth_mm": 0.5, "steps": 8},
-        "model": {"domain": "plane-strain"},
-        "mesh": {"size_mm": 0.1 * coarser},
-    }
+def _tables(scene: Tree, coarser: float) -> Tree:
+    """Return the tables of a scene, with edges longer by a factor."""
+    size = coarser * scene["size_mm"]
+    return block_tables((12.625, 4.0, 20.75), 0.1, 0.49, (size, min(4.0 * size, 2.5)), **scene["tables"])
 
 
 def run(quick: bool) -> Result:
     """Quick: the ball, the plane and the section, on edges twice as long."""
     coarser = 2.0 if quick else 1.0
-    scenes = [SCENES[0], SCENES[-1]] if quick else SCENES
+    every = GIVEN["scene"]
+    scenes = [every[0], every[-1]] if quick else every
     rows, lines, curves, times = list[Row](), [], {}, []
     for scene in scenes:
+        name, seconds_there = scene["name"], scene.get("seconds_there", np.nan)
         began = time.perf_counter()
-        result = press(scene.tables(coarser), figures=False)
+        result = press(_tables(scene, coarser), figures=False)
         seconds = time.perf_counter() - began
-        times.append((scene.name, seconds, scene.seconds_there))
-        curves[scene.name] = [(step.slide_x_mm, step.force_x_N) for step in result.steps]
-        for what, (theirs, read) in scene.numbers.items():
-            here = read(result)
-            rows.append(_beside(scene, what, theirs, here))
-            lines.append((scene.name, what, theirs, here, _bar(result, what), seconds, scene.seconds_there or np.nan))
-        residual = max(step.residual or 0.0 for step in result.steps)
-        rows.append(at_most(f"largest residual, {scene.name}", "Eqs. 1 to 4", 1e-8, residual))
-    rows.append(_kratos_row(coarser))
+        times.append((name, seconds, seconds_there))
+        curves[name] = [(step.slide_x_mm, step.force_x_N) for step in result.steps]
+        for what, number in scene["numbers"].items():
+            theirs, here = number["published"], READ[number["read"]](result)
+            rows.append(judged("beside-ansys", here, theirs, what=what, name=name))
+            lines.append((name, what, theirs, here, _bar(result, what), seconds, seconds_there))
+        rows.append(judged("largest-residual", max(step.residual or 0.0 for step in result.steps), name=name))
+    section = press(GIVEN["section"] | {"mesh": {"size_mm": 0.1 * coarser}}, figures=False)
+    rows.append(judged("beside-kratos", section.last.normal_force_N))
     names = "scene number theirs here bar seconds_here seconds_there"
     return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, times, curves))
-
-
-def _beside(scene: Scene, what: str, theirs: float, here: float) -> Row:
-    reason = "the authors' own bound, 9 %, and what is read off a figure"
-    return Row(f"{what}: {scene.name}", scene.source, theirs, here, THEIRS, reason, "statement")
 
 
 def _bar(result: PressResult, what: str) -> float:
@@ -175,17 +108,10 @@ def _bar(result: PressResult, what: str) -> float:
     return float(np.nansum(parts)) if key and not np.isnan(parts[0]) else np.nan
 
 
-def _kratos_row(coarser: float) -> Row:
-    """Where a force converges that rises from mesh to mesh there."""
-    force = press(_kratos(coarser), figures=False).last.normal_force_N
-    return Row("normal force of a half cylinder R 2 on a section, N per mm: the finest of three meshes, which rise "
-               "by 17 and 7 %", KRATOS, KRATOS_FORCES[-1], force, 0.1, "E and R are inferred", "statement")  # fmt: skip
-
-
-def _draw(figure: Any, times: list[tuple[str, float, float | None]], curves: dict[str, Any]) -> None:
+def _draw(figure: Any, times: list[tuple[str, float, float]], curves: dict[str, Any]) -> None:
     figure.set_size_inches(11.0, 4.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
-    known = [(name, here, there) for name, here, there in times if there]
+    known = [(name, here, there) for name, here, there in times if np.isfinite(there)]
     place = np.arange(len(known))
     left.barh(place - 0.2, [there for *_, there in known], 0.36, color="#b3b3b3", label="ANSYS, 8 cores (published)")
     left.barh(
@@ -197,7 +123,7 @@ def _draw(figure: Any, times: list[tuple[str, float, float | None]], curves: dic
     left.set_ylim(len(known) + 0.6, -0.6)
     left.legend(frameon=False, fontsize=8, loc="lower right")
     left.set_title("time of a press or a slide")
-    name = SCENES[-1].name
+    name = GIVEN["scene"][-1]["name"]
     slide, pull = np.abs(curves[name]).T
     right.plot(slide, pull, "o-", color="#2166ac", ms=4, label="finger3d")
     right.axhline(2.15, color="#888888", ls="--", label="ANSYS at 1 mm, 2.15 N")

@@ -27,10 +27,11 @@ from ._ccx import run as run_calculix
 from ._child import Bench, best_of
 from ._cost import SECTION, SOLID, Case, model_of
 from ._cost_runs import MODULE
-from ._rows import Result, Row, at_least, committed_instead, grouped
+from ._rows import Result, Row, committed_instead, grouped, listed
 
 BY_NAME = True
-CALCULIX = "CalculiX 2.20, same mesh"
+judged = listed(__file__)
+
 WANTED = {SECTION: 20.0, SOLID: 60.0}  # goals: time of CalculiX over finger3d's
 NU = 0.45
 # MPa/mm, under pressures of .2 MPa: of those tried on the coarsest solid (100 and 10, 20 and 5, 20 and 2) the quickest,
@@ -115,24 +116,20 @@ def _threads() -> int:
 def _rows(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator[Row]:
     """The force on every mesh; friction where the mesh has some points across the finger."""
     here = f"{ours['body']}, edges of {ours['size_mm']:g} mm, {ours['dofs']:.0f} unknowns"
-    why = "the penalty contact yields by 0.015 mm of 10 mm, which is 0.2 % of the force; other meshing of contact"
-    yield Row(f"force (N), {here}", CALCULIX, theirs["force_N"], ours["force_N"], 0.01, why)
-    why = "error of friction on this mesh (cost_of_accuracy); contact at vertices here, at quadrature points there"
+    yield judged("force", ours["force_N"], theirs["force_N"], here=here)
     if ours["body"] == SECTION or ours["size_mm"] <= 2.0:
         for axis in "x" if ours["body"] == SECTION else "xz":
             key = f"outward_friction_{axis}_N"
-            yield Row(f"outward friction along {axis} (N), {here}", CALCULIX, theirs[key], ours[key], 0.05, why)
+            yield judged("outward-friction", ours[key], theirs[key], axis=axis, here=here)
 
 
 def times(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[Row]:
     """Wall time, as a user waits, and processor time, in which the machine's other work counts less."""
     here = f"{ours['body']}, edges of {ours['size_mm']:g} mm, {ours['dofs']:.0f} unknowns"
-    wanted, source = WANTED[ours["body"]], "goal of this project"
-    why = "from meshing to the last increment here, the whole run there"
     wall, cpu = (theirs[k] / ours[k] for k in ("wall_s", "cpu_s"))
     return [
-        at_least(f"time of CalculiX over finger3d's, {here}", source, wanted, wall, why, "validation"),
-        at_least(f"processor time of CalculiX over finger3d's, {here}", source, wanted, cpu, why, "validation"),
+        judged("time-of-calculix", wall, WANTED[ours["body"]], here=here),
+        judged("processor-time-of-calculix", cpu, WANTED[ours["body"]], here=here),
     ]
 
 

@@ -46,12 +46,12 @@ from ._common import (
 from ._corner import clamped_free, extrapolated, observed
 from ._layer import line, point
 from ._press import converged
-from ._rows import Result, Row, exact_columns, together, zero
+from ._rows import Result, Row, exact_columns, listed, together
+
+judged = listed(__file__)
 
 RADIUS = 1e5  # of the indenter, in thicknesses: the theory neglects slopes, which add some a / R to the force
-_LAYER = "Gladwell 1980; REFERENCES.md, 1.7"
-_ONE = "second order in the point spacing; 0.08 % or less measured at 5 to 40 points to a"
-_ONE += ", and coarse meshes must pass too"
+
 TABLE = {  # REFERENCES.md, 1.7, nu = 0.3: a/h -> P/P_Hertz, depth R/a^2
     "line": {0.1: (1.0071, 1.4960), 0.5: (1.1661, 0.8199), 1.0: (1.5556, 0.6540), 2.0: (2.5184, 0.5711)},
     "point": {0.1: (1.0005, 0.9421), 0.5: (1.0516, 0.7588), 1.0: (1.2589, 0.6476), 2.0: (1.8789, 0.5730)},
@@ -128,19 +128,15 @@ def _layer(quick: bool) -> Result:
                     sizes, found = [1.0 / 2**n for n in range(1, levels + 1)], point_levels(a, nu, levels)
                 table += [(kind, nu, a, round(1 / h), *e) for h, e in zip(sizes, found, strict=True)]
                 wanted = exact(a, nu).force
-                what = f"P/P_Hertz(a), {kind}, a/h = {a:g}, nu = {nu:g}"
-                rows.append(Row(what, _LAYER, wanted, wanted * (1.0 + found[-1][0]), 0.01, _ONE))
+                rows.append(judged("force-on-layer", wanted * (1.0 + found[-1][0]), wanted, kind=kind, a=a, nu=nu))
                 # a/h = 0.1: the mesher's growth of 0.25 governs, which does not shrink; depth < a^2/2R: the edge lies
                 # beyond where the rigid indenter would overlap, in coarser cells
                 fair = kind == "point" or (a >= 0.5 and exact(a, nu).depth > 0.5)
                 if fair and len(sizes) > 2:
                     slopes.append(rate(sizes[-3:], [e[1] for e in found[-3:]]))
                     curves[kind][f"a/h = {a:g}, nu = {nu:g}"] = (sizes, [e[1] for e in found])
-            if not slopes:
-                continue
-            what = f"rate of the force, {kind}, nu = {nu:g}, lowest over a/h"
-            why = "the depths sample the position of the edge between two points; a higher rate passes"
-            rows.append(Row(what, "Brezzi, Hager, Raviart 1977", 2.0, min(slopes), 0.15, why, measure="at least"))
+            if slopes:
+                rows.append(judged("rate-of-the-force", min(slopes), kind=kind, nu=nu))
     if not quick:
         rows.append(_own_path())
     names = "kind nu a_over_h points_per_a error_at_a rms_error"
@@ -155,9 +151,7 @@ def _table_row() -> Row:
         for a, both in TABLE[kind].items()
         for got, want in zip((exact(a, 0.3).force, exact(a, 0.3).depth), both, strict=True)
     ]
-    worst = max(abs(got / want - 1.0) for got, want in pairs)
-    what = "integral equation of this study against the table, nu = 0.3, 16 values: largest relative difference"
-    return zero(what, "REFERENCES.md, 1.7", worst, 2e-4, "the table has four decimals")
+    return judged("integral-equation", max(abs(got / want - 1.0) for got, want in pairs))
 
 
 def _own_path() -> Row:
@@ -166,8 +160,7 @@ def _own_path() -> Row:
     legs = _legs(np.array([a]), nu, point)
     got = forces(_model(a, nu, (0.2, 0.8), Sphere(radius_mm=RADIUS), "ftetwild", legs))[-1]
     hertz = 4.0 / 3.0 * a**3 / (RADIUS * (1.0 - nu**2))
-    what = "P/P_Hertz(a), point, a/h = 1, nu = 0.3, ftetwild, 5 points to a"
-    return Row(what, _LAYER, point(a, nu).force, float(got / hertz), 0.01, _ONE)
+    return judged("force-on-layer-by-ftetwild", got / hertz, point(a, nu).force)
 
 
 def draw_layer(figure: Any, curves: dict[str, dict[str, Any]]) -> None:
@@ -179,8 +172,6 @@ def draw_layer(figure: Any, curves: dict[str, dict[str, Any]]) -> None:
         axes.set_title("cylinder, plane strain" if kind == "line" else "ball, 3D")
 
 
-_WILLIAMS = "2e of the rim, Williams 1952; REFERENCES.md, 5.3"
-_BOND = "Gent and Lindley 1959; REFERENCES.md, 5.5"
 DIGITS = {
     "strip": "the reference has four digits, and the last may be off by one",
     "disc": "the last digit of the reference and a coarser mesh",
@@ -230,10 +221,9 @@ def _strip_and_disc(quick: bool) -> Result:
         limit = extrapolated(found[-2], found[-1], theory, sizes[-2] / sizes[-1])
         errors[shape][f"nu = {nu:g}"] = [v / limit - 1.0 for v in found]
         table += [(shape, nu, n, v) for n, v in zip(counts[shape], found, strict=True)]
-        rows.append(Row(f"E_a/E of a {shape}, nu = {nu:g}", _BOND, wanted, limit, 5e-4, DIGITS[shape]))
-        why = "on the coarsest mesh the smooth part of the error, of fourth order, still contributes"
-        what, got = f"rate of E_a, {shape}, nu = {nu:g}", observed(sizes, found)
-        rows.append(Row(what, _WILLIAMS, theory, got, 0.05 if shape == "strip" else 0.15, why, measure="absolute"))
+        rows.append(judged("e-a-over-e", limit, wanted, shape=shape, nu=nu, why=DIGITS[shape]))
+        allowed = 0.05 if shape == "strip" else 0.15
+        rows.append(judged("rate-of-e-a", observed(sizes, found), theory, allowed, shape=shape, nu=nu))
     names = "body nu cells apparent_modulus_over_E"
     return Result(tuple(rows), exact_columns(names, table), lambda figure: draw_strip_and_disc(figure, counts, errors))
 

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import sys
 import time
-import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from itertools import product
-from pathlib import Path
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,21 +20,22 @@ from finger3d.analyses.calculix import Contact
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.design import Design, designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.scene import Scene, scene_of
 
 from ._ccx import INSTALL, program
 from ._ccx import run as run_calculix
-from ._press import converged, fig9_finger
-from ._rows import Result, Row, at_least, exact_columns, grouped, together
+from ._press import converged, fig9_model
+from ._rows import Result, Row, exact_columns, given, grouped, listed, together
+
+judged = listed(__file__)
 
 TOLERANCE = 0.01
-REASON_DECKS = "wanted of the deck: 1 %; penalty and multipliers, facets and surface: 0.8 % or less measured"
 LIMIT_S_DECKS = 1200.0
-DECKS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+DECKS = given(__file__)
 """Tables that all scenes have, those of both fingers, and cases: keys, and the force (N) along -y of CalculiX 2.20."""
 
 
@@ -61,17 +59,14 @@ def _decks(quick: bool) -> Result:
     runs = not quick and program() is not None
     if not quick and not runs:
         print(f"calculix_forces: ccx is not installed ({INSTALL}); the numbers kept stay", file=sys.stderr)
-    source = f"CalculiX, deck of the scene, {'run for this' if runs else '2.20, number kept'}"
+    source = "run for this" if runs else "2.20, number kept"
     lines = []
     for case in DECKS["case"][:3] if quick else DECKS["case"]:
         scene = deck_scene(case)
         ours = finger3d.press(scene.with_effects(scene.fixed_effects), error=False).last.normal_force_N
         theirs = run_calculix(scene.model(), LIMIT_S_DECKS).force if runs else case["kept_N"]
         lines.append((case["name"], theirs, ours))
-    rows = [
-        Row(f"force (N): {name}", source, theirs, ours, TOLERANCE, REASON_DECKS, "validation")
-        for name, theirs, ours in lines
-    ]
+    rows = [judged("force-by-deck", ours, theirs, TOLERANCE, name=name, source=source) for name, theirs, ours in lines]
     table = exact_columns("case calculix_N finger3d_N", lines)
     return Result(tuple(rows), table, lambda figure: _draw_decks(figure, table))
 
@@ -90,60 +85,36 @@ def _draw_decks(figure: Any, table: dict[str, list[Any]]) -> None:
 
 LABELS = {2: ("contact", "walls"), 3: ("contact", "walls", "ends")}
 PENALTY_FACES, STICK_FACES = 100.0, 40.0
-NU_FACES, MU_FACES = (0.3, 0.4, 0.45), (0.0, 0.25, 1.0)
-REASON_FACES = "two formulations of contact, penalty and multipliers; 1.1 % or less measured"
 LIMIT_S_FACES = 900.0
 
 
-@dataclass(frozen=True)
-class Press:
-    """A press: body, domain, constants, depth and edge lengths (mm), and the force (N) that CalculiX 2.20 gave."""
+class Press(NamedTuple):
+    """A press: its body, domain, depth and edge length (mm), constants, and the force (N) that CalculiX 2.20 gave."""
 
-    name: str
-    body: Design
-    domain: Domain
+    given: Tree
     nu: float
     mu: float
-    depth: float
-    size: float
     kept: float
-    is_timed: bool = False
 
     @property
     def what(self) -> str:
         """The case in words."""
-        return f"{self.name}, {self.domain}, nu = {self.nu:g}, mu = {self.mu:g}, {self.depth:g} mm"
+        given = self.given
+        return f"{given['name']}, {given['domain']}, nu = {self.nu:g}, mu = {self.mu:g}, {given['depth_mm']:g} mm"
 
     def model(self) -> Model:
         """The model of this program."""
-        mesh, legs = MeshOptions(self.size, 2.0 * self.size, "swept"), (Leg(self.depth, steps=10),)
+        given, size = self.given, self.given["size_mm"]
+        body = designs()[given["geometry"]](**given["finger"])
+        mesh, legs = MeshOptions(size, 2.0 * size, "swept"), (Leg(given["depth_mm"], steps=10),)
         material, friction = Isotropic(1.0, self.nu), Coulomb(self.mu)
-        return Effect().apply(Model(self.body, material, mesh, legs, friction=friction, domain=self.domain))
-
-
-_BLOCK_N = (4.482234, 4.517796, 4.517418, 5.385558, 5.63335, 5.629454, 6.166706, 6.734432, 6.76554)
-_CYLINDER_N = (6.245192, 6.48522, 6.52479, 8.715404, 8.715928, 8.702082, 11.742226, 11.934856, 12.092736)
+        return Effect().apply(Model(body, material, mesh, legs, friction=friction, domain=given["domain"]))
 
 
 def cases(quick: bool) -> list[Press]:
-    """Sections, then solids; the last is timed."""
-    block = designs()["block"](half_length_mm=6.0, height_mm=10.0, width_mm=1.0)
-    cylinder = designs()["half_cylinder"](radius_mm=10.0, width_mm=1.0)
-    short = designs()["block"](half_length_mm=5.0, height_mm=10.0, width_mm=8.0)
-    finger = fig9_finger()
-    found = [
-        Press(name, body, "plane-strain", nu, mu, depth, 0.7, force)
-        for name, body, depth, forces in (
-            ("block", block, 2.5, _BLOCK_N),
-            ("half cylinder", cylinder, 3.5, _CYLINDER_N),
-        )
-        for (nu, mu), force in zip(product(NU_FACES, MU_FACES), forces, strict=True)
-    ]
-    if quick:
-        return [found[4]]
-    solid = ((0.3, 0.25, 28.318264), (0.45, 0.25, 31.8341), (0.4, 1.0, 30.612928), (0.4, 0.0, 29.016908))
-    found += [Press("block", short, "solid", nu, mu, 2.5, 1.4, force) for nu, mu, force in solid]
-    return [*found, Press("Fig. 9 finger", finger, "solid", 0.45, 0.25, 10.0, 4.0, 356.31476, is_timed=True)]
+    """Sections, then solids; quick: one section."""
+    found = [Press(body, *case) for body in DECKS["press"] for case in body["cases"]]
+    return [found[4]] if quick else found
 
 
 def _faces(quick: bool) -> Result:
@@ -180,12 +151,26 @@ def _compared(case: Press, quick: bool, lines: list[tuple[Any, ...]]) -> Iterato
         source = "CalculiX, same mesh and law, run for this"
     wanted = case.kept if theirs is None else theirs.force
     on_walls = np.count_nonzero(end.state.force[problem.points.face > 0, 0] > 0.0)
-    given = case.name, case.domain, case.nu, case.mu, case.depth, problem.mesh.points.size
-    lines.append((*given, wanted, force, on_walls, theirs.wall if theirs else np.nan, ours_s))
-    yield Row(f"force, {case.what}, N", source, wanted, force, 0.012, REASON_FACES, "validation")
-    if case.is_timed and theirs:
-        what = f"time of CalculiX over finger3d's, {case.what}, {problem.mesh.points.size} displacements"
-        yield at_least(what, "goal of this project", 30.0, theirs.wall / ours_s, kind="statement")
+    name, domain, depth = (case.given[key] for key in ("name", "domain", "depth_mm"))
+    unknowns = problem.mesh.points.size
+    lines.append(
+        (
+            name,
+            domain,
+            case.nu,
+            case.mu,
+            depth,
+            unknowns,
+            wanted,
+            force,
+            on_walls,
+            theirs.wall if theirs else np.nan,
+            ours_s,
+        )
+    )
+    yield judged("force-on-all-faces", force, wanted, what=case.what, source=source)
+    if "is_timed" in case.given and theirs:
+        yield judged("time-of-calculix", theirs.wall / ours_s, what=case.what, unknowns=unknowns)
 
 
 def _draw_faces(figure: Any, table: dict[str, list[Any]]) -> None:
@@ -205,7 +190,6 @@ DEPTHS = (5.0, 10.0)
 KEPT = {4.0: (8.81694, 28.5524), 2.0: (8.80263, 28.4931)}
 """N per mm at DEPTHS by mesh, CalculiX 2.20: this study in full."""
 
-REASON_SECTION = "two contact formulations, penalty and multipliers; 0.3 % or less measured"
 PENALTY_SECTION = 100.0  # MPa/mm: under 1 MPa the surfaces overlap by 0.01 mm, 1e-3 of the depth
 STICK_SECTION = 10.0  # MPa/mm: friction of 0.1 MPa takes 0.01 mm; ten times as stiff, CalculiX does not settle
 
@@ -224,8 +208,8 @@ def _section(quick: bool) -> Result:
     """
     rows, lines, curves = [], [], {}
     for size in list(KEPT)[:1] if quick else KEPT:
-        case = Press("Fig. 9 finger", fig9_finger(), "plane-strain", 0.45, 0.25, DEPTHS[-1], size, np.nan)
-        model = replace(case.model(), mesh=MeshOptions(size, 4.0 * size, "swept"))
+        legs = (Leg(DEPTHS[-1], steps=10),)
+        model = Effect().apply(fig9_model(0.45, size, 4.0 * size, "plane-strain", legs=legs, friction=Coulomb(0.25)))
         body = build(model)
         frames = [(f.target.depth_mm, measure(body.points, f)["normal_force_N"] / WIDTH) for f in converged(body)]
         curves[size] = np.array(frames)
@@ -237,8 +221,7 @@ def _section(quick: bool) -> Result:
         for depth, theirs in zip(DEPTHS, other, strict=True):
             ours = float(np.interp(depth, *curves[size].T))
             lines.append((size, depth, float(theirs), ours))
-            what = f"force at {depth:g} mm, mesh of {size:g} mm, N per mm"
-            rows.append(Row(what, source, float(theirs), ours, 0.02, REASON_SECTION, "validation"))
+            rows.append(judged("force-of-section", ours, theirs, depth=depth, size=size, source=source))
     table = exact_columns("size_mm depth_mm calculix finger3d", lines)
     return Result(tuple(rows), table, lambda figure: _draw_section(figure, curves, table))
 

@@ -29,7 +29,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder
 from finger3d.sensor import Calibration, estimate
 
-from ._rows import Result, Row, at_most, columns, listed, rms
+from ._rows import Result, Row, columns, listed, rms
 
 judged = listed(__file__)
 
@@ -152,8 +152,7 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
 
 def _near_one(what: str, z: Float) -> Iterator[Row]:
     """Yield two rows: the stated errors are not too small, and they are not much too large."""
-    why = "all readings of a body share one error of that body"
-    yield at_most(what, "1 if the errors are right", 1.3, rms(z), why, "sensitivity")
+    yield judged("not-above", rms(z), what=what)
     yield judged("not-less-than-half", rms(z), what=what)
 
 

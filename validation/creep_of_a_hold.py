@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,10 +43,11 @@ from finger3d.progress import QUIET
 from finger3d.scene import scene_of
 
 from ._press import block_tables, changed, converged
-from ._rows import Result, Row, columns, committed_instead, listed
+from ._rows import Result, Row, columns, committed_instead, given, listed
 from .held_weights import largest_change
 
 judged = listed(__file__)
+MUJOCO = given(__file__)["mujoco"]
 
 MASS, NORMAL, MU, G, HOLD_S = 0.045, 12.0, 1.0, 9.81, 60.0
 LEAST_GRIP = 0.5 * MASS * G / MU
@@ -72,17 +73,7 @@ class Grip:
 
     def xml(self) -> str:
         """The model as MuJoCo reads it."""
-        geom = f'<geom type="{self.pads}" size=".01 .01 .01" mass="{self.pad_kg}" friction="{MU}"/>'
-        return f"""<mujoco>
-<option cone="elliptic" timestep="{self.step_s}" impratio="{self.impratio}" noslip_iterations="{self.noslip}"/>
-<worldbody>
-<body><freejoint/>
-<geom type="box" size=".02 .02 {self.half_length_m}" mass="{MASS}" friction="{MU}"/></body>
-<body pos="-.03 0 0"><joint name="left" type="slide" axis="1 0 0"/>{geom}</body>
-<body pos=".03 0 0"><joint name="right" type="slide" axis="-1 0 0"/>{geom}</body>
-</worldbody>
-<actuator><motor joint="left"/><motor joint="right"/></actuator>
-</mujoco>"""
+        return MUJOCO["model"].format(mu=MU, mass=MASS, **asdict(self))
 
     def formula(self) -> float:
         """Creep by the documentation, mm a minute, with the load equal on all contacts, each above 1 mm deep."""
@@ -91,17 +82,7 @@ class Grip:
         return 60e3 * (1.0 - 0.95) / 0.95 * inverse / self.impratio * MASS * G / contacts / (2.0 / (0.95 * 0.02))
 
 
-LONG = 0.2
-GRIPS = (
-    Grip(),
-    Grip(noslip=10),
-    *(Grip(step_s=s) for s in (0.0005, 0.001, 0.004)),
-    *(Grip(impratio=r) for r in (10.0, 100.0)),
-    Grip(impratio=10.0, noslip=10),
-    *(Grip(pad_kg=kg, half_length_m=LONG) for kg in (0.02, 10.0)),
-    Grip("ellipsoid", half_length_m=LONG),
-    Grip("ellipsoid", half_length_m=LONG, noslip=10),
-)
+GRIPS = tuple(Grip(**grip) for grip in MUJOCO["grips"])
 
 
 def mujoco_fall(grip: Grip, force: float, begin: float, seconds: float) -> tuple[float, int]:
@@ -183,14 +164,12 @@ def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> Iterator[
 
 
 def _label(line: tuple[Any, ...]) -> str:
-    program, pads, kg, step, ratio, noslip, *_ = line
+    program, *settings = line[:6]
     if program == "finger3d":
         return "finger3d"
-    usual = {"pads": "box", "kg": 1.0, "step": 2.0, "impratio": 1.0, "noslip": 0.0}
-    now = {"pads": pads, "kg": kg, "step": step, "impratio": ratio, "noslip": noslip}
-    units = {"pads": "{} pads", "kg": "pads of {:g} kg", "step": "step {:g} ms", "impratio": "impratio {:g}",
-             "noslip": "noslip {:g}"}  # fmt: skip
-    changed = [units[k].format(v) for k, v in now.items() if v != usual[k]]
+    usual = ("box", 1.0, 2.0, 1.0, 0.0)
+    texts = ("{} pads", "pads of {:g} kg", "step {:g} ms", "impratio {:g}", "noslip {:g}")
+    changed = [text.format(now) for text, now, then in zip(texts, settings, usual, strict=True) if now != then]
     return ", ".join(["MuJoCo", *(changed or ["default"])])
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +27,7 @@ from finger3d.progress import QUIET
 from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
-from ._press import changed
+from ._press import changed, in_edges
 from ._rows import GOAL, Result, Row, at_least, columns, words, zero
 
 SEED = 68
@@ -79,8 +78,7 @@ def judged(name: str, scene: Scene) -> Iterator[Judged]:
     problem = changed(problem, legs=with_increments_of(problem.model.legs, len(steps)))
     changes = changes_of(scene, problem.model, {})
     found, _ = effects_on(problem, changes, QUIET)
-    own = problem.model.mesh
-    finer = build(replace(problem.model, mesh=replace(own, size_mm=own.size_mm / 2, base_size_mm=own.base_size_mm / 2)))
+    finer = build(in_edges(problem.model, 0.5))
     true = differences(finer, {key: one for key, one in changes.items() if key in found})
     scales = natural_scales(problem.model, steps[-1].target.depth_mm, true.numbers)
     for key, effects in found.items():

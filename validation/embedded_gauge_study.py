@@ -47,11 +47,8 @@ def finger(domain: Domain, length: float, size: float, steps: int) -> Problem:
 
 def strains(problem: Problem, mus: tuple[float, ...]) -> np.ndarray:
     """Free strain and what is read (m, 2) at the end of the press for every mu."""
-    out = []
-    for mu in mus:
-        gauges = under(problem, mu)[-1].gauges
-        out.append((gauges["g_free"], gauges["g"]))
-    return np.array(out)
+    presses = [under(problem, mu)[-1].gauges for mu in mus]
+    return np.array([(gauges["g_free"], gauges["g"]) for gauges in presses])
 
 
 def run(quick: bool) -> Result:

@@ -23,7 +23,9 @@ from finger3d.mechanics.model import Domain, Gauge, Leg, Model
 
 from ._paper import STRAIN, STRESS, said
 from ._press import fig9_model, paper_gauges
-from ._rows import Result, Row, at_most, columns, together
+from ._rows import Result, Row, columns, listed, together
+
+judged = listed(__file__)
 
 NOISE, ERROR = 1.5e-4, 0.1
 MUS = np.array([0.06, 0.125, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
@@ -238,12 +240,9 @@ def _foil(quick: bool) -> Result:
         errors = {"at .5 from a noise of 1.5e-4, second-order fit": _error(mus, strain)}
         errors |= {f"at {mu:g} by the change between neighbours": _local_error(mus, strain, mu) for mu in (0.25, 0.5)}
         for what, error in errors.items():
-            what = f"error of mu {what}, {kind} strain, large deformation"
-            rows.append(at_most(what, "Maeno 2004, Sec. IV: 0.1", ERROR, error, "the paper's claim", "statement"))
+            rows.append(judged("error-of-mu", error, ERROR, what=what, kind=kind))
         lines += [(kind, mu, value) for mu, value in zip(mus.tolist(), strain, strict=True)]
-    stiff = float(np.ptp(found["foil"]) / np.ptp(found["free"]))
-    what = "change of the strain over all mu, a foil's over free, large deformation"
-    rows.append(at_most(what, "a stiffer gauge moves less", 1.0, stiff, kind="sensitivity"))
+    rows.append(judged("change-of-the-strain", np.ptp(found["foil"]) / np.ptp(found["free"])))
     return Result(tuple(rows), columns("kind mu strain", lines), lambda figure: _draw_foil(figure, mus, found))
 
 

@@ -26,15 +26,13 @@ from finger3d._types import Float, Tree
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings import Gauge
 from finger3d.objects import Sphere
 
-from ._press import changed, converged, fig9_finger
+from ._press import block_model, changed, fig9_finger, measured
 from ._rows import Result, Row, listed
 
 judged = listed(__file__)
@@ -52,14 +50,13 @@ def finger(size: float, material: Isotropic, mu: float) -> Model:
 
 def block(size: float, material: Isotropic, mu: float) -> Model:
     """A block under a ball."""
-    design = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=8.0)
-    mesh = MeshOptions(size, 1.2, "swept")
-    return Model(design, material, mesh, (Leg(0.4),), object=Sphere(radius_mm=4.0), friction=Coulomb(mu))
+    more = {"object": Sphere(radius_mm=4.0), "friction": Coulomb(mu)}
+    return block_model((4.0, 3.0, 8.0), material, (size, 1.2), (Leg(0.4),), **more)
 
 
 def history(problem: Problem, legs: tuple[Leg, ...]) -> list[Tree]:
     """What is measured after every increment."""
-    return [measure(problem.points, frame) for frame in converged(changed(problem, legs=legs))]
+    return measured(changed(problem, legs=legs))
 
 
 def by_depths(problem: Problem, steps: list[Tree]) -> list[Tree]:

@@ -30,7 +30,9 @@ from finger3d.progress import QUIET
 from finger3d.sensor import Calibration
 
 from ._press import fig9_model
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, columns, listed
+
+judged = listed(__file__)
 
 Domain = Literal["solid", "plane-strain"]
 
@@ -89,8 +91,8 @@ def run(quick: bool) -> Result:
 
 def best_gauges(body: Model, most: int, tolerances: Mapping[str, float] | None = None) -> dict[str, tuple[Gauge, ...]]:
     """Return the best gauge, the best two and so on, under the default tolerances and those given."""
-    judged = with_defaults({**(tolerances or {}), "increments": 0.0})
-    fields = GaugeFields.of(body, MUS[::2], NOISE, judged, QUIET)
+    known = with_defaults({**(tolerances or {}), "increments": 0.0})
+    fields = GaugeFields.of(body, MUS[::2], NOISE, known, QUIET)
     found = {}
     for count in range(1, most + 1):
         chosen, _ = search(fields, Region.of(body), count, QUIET)
@@ -149,19 +151,14 @@ def _sd(joint: Calibration) -> Float:
 
 def _rows(spread: Spread) -> Iterator[Row]:
     for (domain, measure, name, read), sd in spread.items():
-        at = float(np.interp(0.5, MUS, sd))
-        what = f"standard deviation of mu = 0.5: {NAMES[domain]}, {measure}, {name}, {read}"
-        yield at_most(what, "Maeno 2004, Sec. IV: 0.1", LIMIT, at, "the paper's claim", "statement")
-        share = float(np.mean(sd <= LIMIT))
-        what = f"share of mu = 0.05 to 1 that is found within 0.1: {NAMES[domain]}, {measure}, {name}, {read}"
-        yield at_least(what, "no reference", 0.5, share, "half of the range", "statement")
+        here = f"{NAMES[domain]}, {measure}, {name}, {read}"
+        yield judged("standard-deviation-at-half", np.interp(0.5, MUS, sd), LIMIT, here=here)
+        yield judged("share-within-a-tenth", np.mean(sd <= LIMIT), here=here)
     for domain, measure in dict.fromkeys((key[0], key[1]) for key in spread):
         mean = [float(sd.mean()) for key, sd in spread.items()
                 if key[:2] == (domain, measure) and "best" in key[2] and key[3] == FREE]  # fmt: skip
         worst = max(b / a for a, b in zip(mean, mean[1:], strict=False))
-        what = f"mean standard deviation of mu with a gauge more, over that before: {NAMES[domain]}, {measure}"
-        yield at_most(what, "more readings tell more", 1.05, worst,
-                      "placed with the error of the mesh, judged " "without", "sensitivity")  # fmt: skip
+        yield judged("a-gauge-more", worst, name=NAMES[domain], measure=measure)
 
 
 def _draw(figure: Any, spread: Spread) -> None:

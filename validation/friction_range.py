@@ -8,8 +8,8 @@ slope, the shear stress over the displacement of a point that sticks.  The deck'
 stress of 0.11 MPa at mu = 1 moves a sticking point by 0.014 mm; it is raised a hundred times, to 800 MPa/mm, to come
 nearer to points that do not move.  FElupe 11.3: the same mesh and path, with its rigid plane of penalties and its
 cutbacks, which halve an increment up to ten times.  Its defaults take both penalties from the mean stiffness of the
-nodes, with which the XX ccx or FElupe is not installed its committed
-results are judged.
+nodes, with which the finger enters the plane by 1.8 % of the depth; the tangential one is raised a hundred times, too.
+Where ccx or FElupe is not installed its committed results are judged.
 """
 
 from __future__ import annotations

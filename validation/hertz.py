@@ -36,13 +36,12 @@ from ._common import ball_numbers, contact_axis, convergence, ellipse, ellipse_e
 from ._halfplane import CANDIDATES, Profile, on_block
 from ._layer import line, point
 from ._press import converged
-from ._rows import Result, Row, exact_columns, rms, together, zero
+from ._rows import Result, Row, exact_columns, listed, rms, together
+
+judged = listed(__file__)
 
 RADIUS = 1000.0  # a = 1: the circle is a parabola to 1e-6
-_HERTZ_LINE = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.2"
-_ONE_LINE = (
-    "second order in the point spacing; 0.08 % or less measured on the full meshes, and coarse ones must pass too"
-)
+
 CASES = (("plane-strain", 0.3), ("plane-strain", 0.5), ("plane-stress", 0.3))
 
 
@@ -96,12 +95,7 @@ def _line(quick: bool) -> Result:
         slopes.append([rate(1.0 / np.array(counts[-3:]), e) for e in errors[-3:].T])
         table += [(domain, nu, n, *e) for n, e in zip(counts, errors, strict=True)]
     width, pressure = np.min(slopes, axis=0)
-    why = "20 depths sample the position of the edge between two points"
-    rows += [
-        Row("rate of the half-width, lowest", "h^2, as the force", 2.0, width, 0.15, f"{why}; a higher rate passes",
-            measure="at least"),
-        Row("rate of the pressure in L2, lowest", "square-root edge", 1.0, pressure, 0.1, why, measure="at least"),
-    ]  # fmt: skip
+    rows += [judged("rate-of-the-half-width", width), judged("rate-of-the-pressure-under-cylinder", pressure)]
     size = "half-width over Hertz's at the force, less 1"
     names = "domain nu points_per_a half_width_rms_error pressure_L2_error"
     return Result(tuple(rows), exact_columns(names, table), lambda f: draw(f, "cylinder", counts, curves, size))
@@ -110,19 +104,13 @@ def _line(quick: bool) -> Result:
 def _line_rows(name: str, last: list[Contact]) -> Iterator[Row]:
     """What the finest mesh of a case gives."""
     ratios, peaks = [c.half_width**-2 for c in last], [c.peak for c in last]
-    what = f"P/P_Hertz(a), {name}"
-    yield Row(f"{what}, mean of 20 depths", _HERTZ_LINE, 1.0, float(np.mean(ratios)), 0.01, _ONE_LINE)
-    why = "the edge may lie anywhere between two points; 0.03 % or less measured at 80 points to a"
-    worst = max(abs(ratio - 1.0) for ratio in ratios)
-    yield zero(f"{what}, worst of 20 depths", _HERTZ_LINE, worst, 0.01, why)
-    what = f"p0 over 2P/(pi a), {name}, mean of 20 depths"
-    yield Row(what, _HERTZ_LINE, 1.0, float(np.mean(peaks)), 0.01, _ONE_LINE)
+    yield judged("force-of-cylinder", np.mean(ratios), name=name)
+    yield judged("worst-force-of-cylinder", max(abs(ratio - 1.0) for ratio in ratios), name=name)
+    yield judged("peak-of-cylinder", np.mean(peaks), name=name)
 
 
 HEIGHT = 10.0
 PLACES = np.linspace(0.7, 1.0, 12)
-_HERTZ_SPHERE = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.1"
-_ONE_SPHERE = "second order in the point spacing; 0.08 % or less measured, and coarse meshes must pass too"
 
 
 def depth(a: float, nu: float) -> float:
@@ -151,19 +139,12 @@ def _sphere(quick: bool) -> Result:
     for nu, counts in cases.items():
         levels = [measured_sphere(nu, n) for n in counts]
         sizes = 1.0 / np.array(counts)
-        got = float(levels[-1][:, 0].mean())
-        what = f"P/P_Hertz(a), nu = {nu:g}, {counts[-1]} points to a, mean of 12 depths"
-        rows.append(Row(what, _HERTZ_SPHERE, 1.0, got, 0.01, _ONE_SPHERE))
+        rows.append(judged("force-of-ball", levels[-1][:, 0].mean(), nu=nu, count=counts[-1]))
         errors = np.array([np.sqrt([np.mean((e[:, 0] - 1.0) ** 2), np.mean(e[:, 1] ** 2)]) for e in levels])
         table += [(nu, n, *e) for n, e in zip(counts, errors, strict=True)]
         curves[f"nu = {nu:g}"] = errors
-        why = "12 depths sample the position of the edge between points; a higher rate passes"
-        for column, kind, source, theory in (
-            (0, "P(a), rms", "h^2, as the force", 2.0),
-            (1, "the pressure in L2", "square-root edge", 1.0),
-        ):
-            got = rate(sizes, errors[:, column])
-            rows.append(Row(f"rate of {kind}, nu = {nu:g}", source, theory, got, 0.15, why, measure="at least"))
+        force, pressure = (rate(sizes, column) for column in errors.T)
+        rows += [judged("rate-of-the-force", force, nu=nu), judged("rate-of-the-pressure-under-ball", pressure, nu=nu)]
     size = "P(a)/P_Hertz(a) less 1"
     names = "nu points_per_a force_rms_error pressure_L2_error"
     return Result(tuple(rows), exact_columns(names, table), lambda f: draw(f, "ball", counts, curves, size))

@@ -148,7 +148,6 @@ def _rows(found: list[Fitted], quick: bool) -> Iterator[Row]:
         if len(some) >= 8:
             share = float(np.mean(np.abs(z) <= 2.0))
             yield judged("share-within-two-stated-deviations", share, what=what)
-        if len(some) >= 8:
             yield judged("rms-of-z", rms(z), what=what)
             yield judged("rms-of-z-noise-alone", rms(bare), what=what)
 

@@ -22,7 +22,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere
 
-from ._press import converged
+from ._press import block_model, converged
 from ._rows import Result, exact_columns, grouped, listed, together
 from .triangulated_objects import box, of_trimesh
 
@@ -146,9 +146,8 @@ def on_flanks(angles: tuple[float, float], size: float) -> dict[str, list[float]
 def cube_corner(size: float) -> Float:
     """Components (3,) N of the force on a cube's corner along the normals of its faces: what each face carries."""
     turned = MeshObject(surface=box(5.0, 5.0, 5.0), turn_x=math.pi / 4.0, turn_z=math.atan(1.0 / math.sqrt(2.0)))
-    block = designs()["block"](half_length_mm=4.0, height_mm=4.0, width_mm=8.0)
-    mesh = MeshOptions(size, 1.5, "swept")
-    problem = build(Model(block, Isotropic(E, NU), mesh, (Leg(CORNER_DEPTH, steps=3),), object=turned))
+    legs = (Leg(CORNER_DEPTH, steps=3),)
+    problem = build(block_model((4.0, 4.0, 8.0), Isotropic(E, NU), (size, 1.5), legs, object=turned))
     last = converged(problem)[-1]
     axes = problem.placed(last.target).turned.T
     down = -axes * np.sign(axes[:, 1])[:, None]  # the normals of the three faces that look down

@@ -25,10 +25,11 @@ from . import _halfplane
 from ._common import ticks_at
 from ._halfplane import line, loading, under
 from ._increments import PlainCoulomb
-from ._rows import Kind, Result, Row, at_least, exact_columns
+from ._rows import Result, Row, exact_columns, listed
+
+judged = listed(__file__)
 
 NU, STATIC = 0.3, 0.25
-SOURCE = "Spence 1968 with mu_k; REFERENCES.md, 2.5"
 COLUMNS = "branch ratio points_per_a increments q_over_P D_over_AP2 c_over_a iterations"
 STICK, OUTWARD = "half width of stick / of contact", "friction on one half / normal force"
 Key = tuple[str, float, int, int]
@@ -65,26 +66,17 @@ def _rows(found: dict[Key, np.ndarray], meshes: Any, counts: Any, ratios: Any) -
     fine, many = meshes[-1], counts[-1]
     got = found["keep", 0.7, fine, many]
     here = f"{fine} points to a, {many} increments"
-    near = f"half a point spacing, a/{fine}"
-    yield Row(f"keep, ratio .7: int_0^a q/P, {here}", SOURCE, 0.0773, got[0], 0.03, "0.3 % measured at this mesh")
-    yield Row(f"keep, ratio .7: c/a, {here}", SOURCE, 0.263, got[2], 0.5 / fine, near, measure="absolute")
+    yield judged("keep-q-over-p", got[0], here=here)
+    yield judged("keep-c-over-a", got[2], tolerance=0.5 / fine, here=here, fine=fine)
     for ratio in ratios:
         one, two = found["one coefficient", ratio, fine, many], found["keep", ratio, fine, many]
-        alike = f"over that of one coefficient mu_k, ratio {ratio:g}"
-        yield Row(f"keep: int_0^a q/P {alike}", "Coulomb, mu_k alone", 1.0, two[0] / one[0], 1e-9, "same states")
-        yield Row(f"keep: dissipation {alike}", "Coulomb, mu_k alone", 1.0, two[1] / one[1], 1e-9, "same states")
+        yield judged("keep-q-over-that-of-one-coefficient", two[0] / one[0], ratio=ratio)
+        yield judged("keep-dissipation-over-that-of-one-coefficient", two[1] / one[1], ratio=ratio)
     literal = found["paper", 0.7, fine, many]
-    kind: Kind = "sensitivity"
-    away = abs(literal[2] - 0.263)
-    what = f"paper, ratio .7: distance of c/a from the exact one, {here}"
-    yield at_least(what, SOURCE, 0.1, away, "a bound: this rule does not converge to it", kind)
+    yield judged("paper-distance-of-c-over-a", abs(literal[2] - 0.263), here=here)
     values = [found["paper", 0.7, fine, n][2] for n in counts]
-    what = f"paper, ratio .7: change of c/a from {counts[0]} to {many} increments, {fine} points to a"
-    why = "a bound: the result depends on the increments"
-    yield at_least(what, "no unique solution; REFERENCES.md, 2.5", 0.1, float(np.ptp(values)), why, kind)
-    what = f"paper, ratio .7: int_0^a q/P over the exact one, {here}"
-    why = "4 % measured; not to be relied on"
-    yield Row(what, SOURCE, 1.0, literal[0] / 0.0773, 0.1, why, kind)
+    yield judged("paper-change-of-c-over-a", np.ptp(values), few=counts[0], many=many, fine=fine)
+    yield judged("paper-q-over-p", literal[0] / 0.0773, here=here)
 
 
 def _draw(figure: Any, found: dict[Key, np.ndarray], meshes: Any, counts: Any) -> None:

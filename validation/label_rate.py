@@ -27,27 +27,19 @@ from finger3d.analyses.sweep.run import sweep
 from finger3d.io import write_csv
 
 from ._press import block_tables
-from ._rows import GOAL, Result, Row, at_most, columns
+from ._rows import Result, Row, columns, given, listed
 
 BY_NAME = True
+judged = listed(__file__)
+
 HOURS, SAMPLES, ERROR = 10.0, 1e5, 0.03
 FINER, ORDER, FEW = 0.5, 1.2, 16
 SAMPLES_EACH, ALONE = 667, 334
 LARGE_SIZE, LARGE_SAMPLES = 1.5, 200
 NUMBERS = "normal_force_N", "tangential_force_x_N", "external_work_mJ", "contact_area_mm2"
-OBJECTS: dict[str, tuple[dict[str, Any], dict[str, tuple[float, float]]]] = {
-    "ball": ({"shape": "sphere", "radius_mm": 4.0}, {"object.radius_mm": (3.0, 8.0)}),
-    "cylinder": ({"shape": "cylinder", "radius_mm": 4.0}, {"object.radius_mm": (3.0, 8.0)}),
-    "edge": ({"shape": "wedge", "angle_deg": 40.0, "tip_radius_mm": 1.0}, {"object.tip_radius_mm": (1.0, 3.0)}),
-}
-SIZES = {"ball": 1.0, "cylinder": 0.85, "edge": 0.6}
-"""Edges at the contact, mm."""
-
-DRAWN = {
-    "friction.mu": (0.2, 1.0), "object.x_mm": (-4.0, 4.0), "object.z_mm": (-3.0, 3.0),
-    "press.leg.0.depth_mm": (0.3, 0.8), "press.leg.1.depth_mm": (0.3, 0.8), "press.leg.1.slide_x_mm": (0.05, 0.6),
-    "press.leg.1.slide_z_mm": (-0.3, 0.3),
-}  # fmt: skip
+GIVEN = given(__file__)
+OBJECTS = GIVEN["object"]
+"""Tables of the objects, ranges of the keys that are theirs, and edges at the contact, mm."""
 
 
 class Swept(NamedTuple):
@@ -96,7 +88,7 @@ def scene(name: str, size: float, large: bool) -> dict[str, Any]:
     """The pad under an object."""
     legs = [{"depth_mm": 0.5, "steps": 4}, {"depth_mm": 0.5, "slide_x_mm": 0.1, "steps": 4}]
     return block_tables(
-        (10.0, 4.0, 16.0), 0.1, 0.49, (size, 1.5 * size), object={**OBJECTS[name][0], "x_mm": 0.0, "z_mm": 0.0},
+        (10.0, 4.0, 16.0), 0.1, 0.49, (size, 1.5 * size), object=OBJECTS[name]["table"],
         friction={"mu": 0.5}, press={"leg": legs}, labels={"grid_mm": 0.5},
         effects={"auto": False, **({"large_deformation": {}} if large else {})},
     )  # fmt: skip
@@ -107,14 +99,13 @@ def run(quick: bool) -> Result:
     names, count, alone, longer = (["ball"], 3, 3, 2.0) if quick else (list(OBJECTS), SAMPLES_EACH, ALONE, 1.0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        small = [_swept(name, longer * SIZES[name], count, False, folder) for name in names]
+        small = [_swept(name, longer * OBJECTS[name]["size_mm"], count, False, folder) for name in names]
         large = [] if quick else [_swept("ball", LARGE_SIZE, LARGE_SAMPLES, True, folder)]
         errors = [one.errors(folder) for one in small + large]
         apart = max(one.difference(alone, folder) for one in small)
     rows = [_hours(small, "small strain")]
     rows += [_error(one, error) for one, error in zip(small, errors, strict=False)]
-    what = f"numbers of {alone * len(small)} samples pressed again alone, largest relative difference"
-    rows.append(at_most(what, "the same press", 1e-9, apart, "round-off"))
+    rows.append(judged("samples-pressed-again-alone", apart, count=alone * len(small)))
     if large:
         rows.append(_hours(large, f"large deformation, edges of {LARGE_SIZE} mm"))
     lines = [
@@ -126,7 +117,7 @@ def run(quick: bool) -> Result:
 
 
 def _swept(name: str, size: float, count: int, large: bool, folder: Path) -> Swept:
-    ranges = DRAWN | OBJECTS[name][1]
+    ranges = {key: tuple(ends) for key, ends in (GIVEN["ranges"] | OBJECTS[name]["ranges"]).items()}
     out = folder / f"{name} {large}"
     began = time.perf_counter()
     result = sweep(scene(name, size, large), ranges, out, sample=f"random:{count}", seed=count)
@@ -138,18 +129,14 @@ def _swept(name: str, size: float, count: int, large: bool, folder: Path) -> Swe
 
 def _hours(found: list[Swept], what: str) -> Row:
     """Return the hours that 1e5 samples take on as many cores as this machine has."""
-    each = sum(one.seconds - one.body_seconds for one in found) / sum(one.samples for one in found)
-    name = (
-        f"hours of 1e5 samples on {cores()} cores, {what}: {each:.2f} s each, {sum(o.samples for o in found)} measured"
-    )
-    return Row(name, GOAL, HOURS, each * SAMPLES / 3600.0, 0.0, "a goal", "statement", "at most")
+    count = sum(one.samples for one in found)
+    each = sum(one.seconds - one.body_seconds for one in found) / count
+    return judged("hours", each * SAMPLES / 3600.0, HOURS, cores=cores(), what=what, each=each, count=count)
 
 
 def _error(swept: Swept, errors: Float) -> Row:
     """Return the median error of the normal force."""
-    what = f"error of the normal force, {swept.name}, median of {len(errors)} samples, edges of {swept.size_mm} mm"
-    got = float(np.nanmedian(errors))
-    return Row(what, "order of convergence of forces", ERROR, got, 0.0, "a goal", "statement", "at most")
+    return judged("error", np.nanmedian(errors), ERROR, name=swept.name, count=len(errors), size=swept.size_mm)
 
 
 def _draw(figure: Any, lines: list[tuple[str, int, float, float, float, float]]) -> None:

@@ -21,9 +21,9 @@ from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import box, convergence, error_norms, held_at, mapped, rate, side_load, solve
-from ._rows import Result, Row, exact_columns
+from ._rows import Result, exact_columns, listed
 
-_LAME = "Lame 1852; REFERENCES.md, 5.6"
+judged = listed(__file__)
 KINDS = ("displacement, L2", "gradient, L2", "u(a)")
 SOURCES = ("Ciarlet and Raviart 1972", "Ciarlet and Raviart 1972", "twice the energy's norm")
 CASES = ((0.3, True), (0.3, False), (0.49, False), (0.4999, False), (0.5, False))
@@ -92,12 +92,10 @@ def run(quick: bool) -> Result:
             measured = np.column_stack([found[:, :2], away])
             curves[dim][f"nu = {nu:g}{', plane stress' if plane_stress else ''}"] = measured
             slopes.append([rate(1.0 / np.array(counts[dim][-2:]), e) for e in measured[-2:].T])
-            why = "fourth order; 8 cells through the wall or more"
-            rows.append(Row(f"u(a), {name} (mm)", _LAME, widening(nu, plane_stress), found[-1, 2], 2e-5, why))
+            rows.append(judged("widening", found[-1, 2], widening(nu, plane_stress), name=name))
         worst = np.min(slopes, axis=0)
         for kind, source, theory, got in zip(KINDS, SOURCES, (3.0, 2.0, 4.0), worst, strict=True):
-            what, why = f"rate of {kind}, {dim}D, lowest over nu", "rate of the limit; a higher one passes"
-            rows.append(Row(what, source, theory, got, 0.1, why, measure="at least"))
+            rows.append(judged("rate", got, theory, kind=kind, dim=dim, source=source))
     names = "dim nu plane_stress cells_per_side displacement_L2 gradient_L2 widening_mm"
     return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, counts, curves))
 

@@ -89,9 +89,7 @@ def slid(problem: Problem, centre: float, steps: int) -> Sliding:
     """Press, then turn the plane about the point x = 0, z = -`centre` by a slide and a turn about the press axis."""
     radius = 0.4 * problem.model.design.width_mm
     turn = WAY / math.hypot(centre, radius) if math.isfinite(centre) else 0.0
-    path = [Leg(DEPTH, WAY, steps=steps)]
-    if turn:
-        path = about(centre, turn, steps)
+    path = about(centre, turn, steps) if turn else [Leg(DEPTH, WAY, steps=steps)]
     return _sliding(problem, centre, _last(problem, (Leg(DEPTH, steps=4), *path)), turn / steps)
 
 

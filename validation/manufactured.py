@@ -18,11 +18,12 @@ from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh import quadratic
 
 from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve
-from ._rows import Result, Row, exact_columns
+from ._rows import Result, exact_columns, listed
+
+judged = listed(__file__)
 
 PI = np.pi
 NUS = (0.3, 0.49, 0.4999, 0.5)
-_SOURCE = "Ciarlet 1978; Boffi, Brezzi, Fortin 2013; REFERENCES.md, 5.2"
 
 
 def exact(p: Float) -> Float:
@@ -91,16 +92,15 @@ def run(quick: bool) -> Result:
     for d in (2, 3):
         sizes = 1.0 / np.array(counts[d])
         slopes = np.array([[rate(sizes[-2:], e) for e in found[d, nu][-2:].T] for nu in nus[d]])
-        why = f"a rate of the limit, measured from {counts[d][-2]} to {counts[d][-1]} cells; a higher one passes"
+
         for column, name, wanted in ((0, "displacement, L2", 3.0), (1, "gradient, L2", 2.0), (2, "pressure, L2", 2.0)):
             # at nu < 1/2 the exact pressure is 0, and its error that of the displacement's divergence
             got = slopes[:, column].min() if column < 2 else slopes[-1, 2]
-            what = f"rate of {name}, {d}D, {'lowest over nu' if column < 2 else 'nu = 0.5'}"
-            rows.append(Row(what, _SOURCE, wanted, float(got), 0.1, why, measure="at least"))
+            which = "lowest over nu" if column < 2 else "nu = 0.5"
+            words = {"name": name, "dim": d, "which": which, "coarse": counts[d][-2], "fine": counts[d][-1]}
+            rows.append(judged("rate", got, wanted, **words))
         growth = max(found[d, nu][-1, 0] / found[d, 0.3][-1, 0] for nu in nus[d])
-        what = f"L2 error over that at nu = 0.3, {d}D, largest over nu"
-        why = "a constant that grew with nu would mean locking; the error of the pressure contributes a little"
-        rows.append(Row(what, "no locking", 1.0, float(growth), 0.05, why, measure="at most"))
+        rows.append(judged("no-locking", growth, dim=d))
     flat = [(d, nu, n, *values) for (d, nu), e in found.items() for n, values in zip(counts[d], e, strict=True)]
     names = "dim nu cells_per_side displacement_L2 gradient_L2 pressure_L2"
     return Result(tuple(rows), exact_columns(names, flat), lambda f: draw(f, found, counts))

@@ -8,7 +8,6 @@ netgen's with half of them.
 from __future__ import annotations
 
 import tempfile
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,12 +23,12 @@ from finger3d.mechanics.march.solve import march
 from finger3d.scene import Scene, parse
 
 from ._press import empty_mesh_cache
-from ._rows import Result, Row, columns, listed
+from ._rows import Result, Row, columns, given, listed
 
 judged = listed(__file__)
 
 MESHERS = ("ftetwild", "netgen")
-GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+GIVEN = given(__file__)
 """Tables that all scenes have, and those of every body."""
 
 

@@ -23,7 +23,7 @@ from finger3d.analyses.identify.material_tests import MaterialTest, read_materia
 from finger3d.analyses.identify.run import Identification, identify
 from finger3d.fem.laws.base import nominal_stress, principal_stretches
 
-from ._rows import Result, Row, columns, listed
+from ._rows import Result, Row, columns, given, listed
 
 judged = listed(__file__)
 
@@ -31,21 +31,9 @@ DATA = Path(__file__).with_suffix(".csv")
 STRETCH_SD = 0.005 / np.sqrt(3.0)
 """Standard deviation of a stretch that is rounded to 0.01."""
 _KEY = "effects.large_deformation."
-LAWS: dict[str, tuple[dict[str, Any], dict[str, tuple[float, float]]]] = {
-    "neo-hookean": ({}, {}),
-    "mooney-rivlin": ({}, {"c01_share": (0.0, 1.0)}),
-    "yeoh": ({}, {"c2_over_c1": (-0.5, 0.5), "c3_over_c1": (-0.2, 0.2)}),
-    "ogden": (
-        {"terms": [[0.5, 2.0], [0.5, 5.0]]},
-        {"terms.0.0": (0.0, 1.0), "terms.0.1": (0.2, 3.0), "terms.1.1": (3.0, 14.0)},
-    ),
-}
-"""Constants that are given, and bounds of those that are free, by law."""
-FITS = {
-    "tension": ("tension",),
-    "tension and compression": ("tension", "compression"),
-    "all tests": ("tension", "compression", "shear", "equibiaxial"),
-}
+GIVEN = given(__file__)
+LAWS, FITS = GIVEN["law"], GIVEN["fits"]
+"""Constants that are given and bounds of those that are free, by law; and the tests that it is fitted to."""
 PREDICTED = ("shear", "equibiaxial")
 MODES = {"shear": "pure shear", "equibiaxial": "equibiaxial tension"}
 """Names of tests that are not their own."""
@@ -102,7 +90,7 @@ def run(quick: bool) -> Result:
     """Quick: two of the laws."""
     tests = {test.mode: test for test in read_material_tests(DATA)}
     with tempfile.TemporaryDirectory() as folder:
-        fits = [_fitted(law, own, tests, Path(folder)) for own in FITS for law in list(LAWS)[: 2 if quick else None]]
+        fits = [_fitted(law, own, Path(folder)) for own in FITS for law in list(LAWS)[: 2 if quick else None]]
     lines = [
         (f.law, f.tests, mode, f.found.fitted.values[0], f.misfit(test), f.beyond(test))
         for f in fits
@@ -112,21 +100,12 @@ def run(quick: bool) -> Result:
     return Result(tuple(_rows(fits, tests)), table, lambda figure: _draw(figure, fits, tests))
 
 
-def _fitted(law: str, own: str, tests: dict[str, MaterialTest], folder: Path) -> Fit:
-    given, free = LAWS[law]
-    scene = {
-        "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 10.0, "width_mm": 20.0},
-        "material": {"E_MPa": 1.0, "nu": 0.49},
-        "mesh": {"size_mm": 2.0, "base_size_mm": 4.0},
-        "object": {"shape": "plane"},
-        "friction": {"mu": 0.5},
-        "press": {"depth_mm": 1.0, "steps": 2},
-        "effects": {"large_deformation": {"law": law, **given}},
-    }
+def _fitted(law: str, own: str, folder: Path) -> Fit:
+    scene = GIVEN["scene"] | {"effects": {"large_deformation": {"law": law, **LAWS[law]["given"]}}}
     rows = [line for line in DATA.read_text("utf-8").splitlines() if line.split(",")[-1] in ("mode", *FITS[own])]
     measured = folder / f"{own}.csv"
     measured.write_text("\n".join(rows) + "\n", "utf-8")
-    bounds = {"material.E_MPa": (0.2, 5.0), **{_KEY + key: between for key, between in free.items()}}
+    bounds = {"material.E_MPa": (0.2, 5.0), **{_KEY + key: tuple(ends) for key, ends in LAWS[law]["free"].items()}}
     return Fit(law, own, identify(scene, measured, bounds, folder / f"{own} {law}"))
 
 

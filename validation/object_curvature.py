@@ -14,7 +14,6 @@ strain more than friction does, so its calibration must be made on the object's 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,11 +22,10 @@ from scipy.optimize import brentq
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg
 from finger3d.objects import Cylinder, Plane, RigidObject
 
-from ._press import converged, fig9_model
+from ._press import changed, fig9_model, measured
 from ._rows import Result, Row, listed
 
 judged = listed(__file__)
@@ -47,9 +45,7 @@ def at_force(problem: Problem, mu: float, steps: int) -> tuple[float, float, flo
     """Depth (mm), strain of the gauge and half the contact length (mm) where the force reaches FORCE."""
 
     def pressed(depth: float) -> dict[str, Any]:
-        model = replace(problem.model, friction=Coulomb(mu), legs=(Leg(depth, steps=steps),))
-        frame = converged(replace(problem, model=model))[-1]
-        return measure(problem.points, frame)
+        return measured(changed(problem, friction=Coulomb(mu), legs=(Leg(depth, steps=steps),)))[-1]
 
     depth = brentq(lambda d: pressed(d)["normal_force_N"] - FORCE, 2.0, 14.0, rtol=1e-6)
     found = pressed(depth)

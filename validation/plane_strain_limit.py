@@ -21,24 +21,23 @@ from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 
 from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated
-from ._press import converged, fig9_finger
-from ._rows import Result, Row, exact_columns, zero
+from ._press import fig9_finger, measured
+from ._rows import Result, Row, exact_columns, listed
+
+judged = listed(__file__)
 
 STEPS = 5
-_WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"
-_HALF = "the corners of the base leave an error of order h^1.2; 0.2 % or less measured"
 
 
 def press(size: float, nu: float, mesher: str = "swept", **changes: Any) -> list[dict[str, Any]]:
     """Numbers of every increment."""
     mesh, legs = MeshOptions(size, 2.0 * size, mesher), (Leg(10.0, steps=STEPS),)
     problem = build(Model(fig9_finger(), Isotropic(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
-    return [measure(problem.points, frame) for frame in converged(problem)]
+    return measured(problem)
 
 
 def forces(size: float, nu: float, **changes: Any) -> Float:
@@ -57,9 +56,8 @@ def run(quick: bool) -> Result:
         limit = np.array([extrapolated(c, f, theory) for c, f in zip(sections[-2], sections[-1], strict=True)])
         solids = [forces(s, nu, held_ends=True) for s in deep]
         same = forces(deep[-1], nu, domain="plane-strain")
-        what = f"force of a solid with held ends, nu = {nu:g}, {deep[-1]:g} mm cells: over the section's"
-        rows.append(Row(f"{what} on the same cells", "2D", 1.0, float(solids[-1][-1] / same[-1]), 0.005, _HALF))
-        rows.append(Row(f"{what} extrapolated", "2D", 1.0, float(solids[-1][-1] / limit[-1]), 0.005, _HALF))
+        for which, of in (("on the same cells", same), ("extrapolated", limit)):
+            rows.append(judged("force-with-held-ends", solids[-1][-1] / of[-1], nu=nu, size=deep[-1], which=which))
         curves[nu] = {}
         for dim, sizes, found in (("section", flat, sections), ("held solid", deep, solids)):
             errors = np.array([np.sqrt(np.mean((f / limit - 1.0) ** 2)) for f in found])
@@ -68,15 +66,11 @@ def run(quick: bool) -> Result:
             if dim == "section" and quick:
                 continue  # two of its three sizes make the limit
             last = slice(-5, -2) if dim == "section" else slice(None)
-            why = "the contact edge adds an oscillating error of second order; a higher rate passes"
-            what, got = f"rate of the force, {dim}, nu = {nu:g}", rate(sizes[last], errors[last])
-            rows.append(Row(what, _WILLIAMS, theory, got, 0.25, why, measure="at least"))
+            rows.append(judged("rate-of-the-force", rate(sizes[last], errors[last]), theory, dim=dim, nu=nu))
     rows += _mirrors(6.0)
     if not quick:
         both = [press(2.0, 0.49, mesher)[-1]["normal_force_N"] for mesher in ("swept", "ftetwild")]
-        what = "force of the solid with free ends, nu = 0.49, 2 mm cells, ftetwild over swept"
-        why = "order h^1.2 on either mesh; 0.2 % measured"
-        rows.append(Row(what, "the other mesher", 1.0, both[1] / both[0], 0.01, why))
+        rows.append(judged("force-by-ftetwild", both[1] / both[0]))
     names = "body nu size_mm force_N rms_error"
     return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
@@ -87,8 +81,7 @@ def _mirrors(size: float) -> Iterator[Row]:
     for name, planes in (("half by x", ("x",)), ("half by z", ("z",)), ("whole", ())):
         other = press(size, 0.49, symmetry=planes)[-1]
         away = max(abs(other[k] / quarter[k] - 1.0) for k in ("normal_force_N", "friction_sum_N", "dissipation_mJ"))
-        what = f"{name} against quarter: force, friction sum, dissipation, largest relative difference"
-        yield zero(what, "mirror image", away, 1e-9, "the same, up to convergence of contact")
+        yield judged("mirror-image", away, name=name)
 
 
 def draw(figure: Any, curves: dict[float, dict[str, tuple[Float, Float]]]) -> None:

@@ -34,7 +34,9 @@ from finger3d.errors import Finger3dError
 from finger3d.scene import parse
 
 from ._effect_scenes import COIN, log_uniform, objects
-from ._rows import GOAL, Result, Row, at_most, exact_columns
+from ._rows import Result, exact_columns, listed
+
+judged = listed(__file__)
 
 SCENES, SCENES_QUICK = 60, 2
 LIMIT_S = 240.0
@@ -109,7 +111,7 @@ def _drawn(random: np.random.Generator) -> Tree:
             "angle_deg": random.uniform(0.0, 90.0), "length_mm": float(random.choice([0.0, 0.1])) * high,
         }],
         "marker": [{"name": "m", "x_mm": random.uniform(-0.4, 0.4) * half, "y_mm": 0.6 * high}],
-        "effects": _effects(random, large, solid, high),
+        "effects": _effects(random, large, high),
     }  # fmt: skip
     if has_parts:
         tables["parts"] = {"skin": {"E_MPa": stiff * 3.0, "nu": 0.4}, "core": {"rigid": True}}
@@ -192,7 +194,7 @@ def _legs(random: np.random.Generator, solid: bool, depth: float, stiffness: flo
     return legs
 
 
-def _effects(random: np.random.Generator, large: bool, solid: bool, high: float) -> Tree:
+def _effects(random: np.random.Generator, large: bool, high: float) -> Tree:
     """Return the tables of the effects, each at random."""
     laws: tuple[Tree, ...] = (
         {},
@@ -303,12 +305,10 @@ def run(quick: bool) -> Result:
     outcomes = Counter(one.outcome for one in found)
     here = f"{len(found)} random scenes, seed {seed}"
     rows = (
-        at_most(f"{here}: faults", GOAL, 0.0, sum(bool(one.faults) for one in found), "none"),
-        Row(f"{here}: not ended within {LIMIT_S:g} s", GOAL, 0.0, outcomes["not ended"] / len(found), 0.02,
-            "deep folds at large deformation", "statement", "at most"),
-        Row(f"{here}: share converged", GOAL, 1.0, outcomes["converged"] / len(found), 0.1,
-            "harder than what a user writes", "statement", "at least"),
-    )  # fmt: skip
+        judged("faults", sum(bool(one.faults) for one in found), here=here),
+        judged("not-ended", outcomes["not ended"] / len(found), here=here, limit=LIMIT_S),
+        judged("share-converged", outcomes["converged"] / len(found), here=here),
+    )
     table = exact_columns(" ".join(Pressed._fields), found)
     return Result(rows, table, lambda figure: _draw(figure, table))
 

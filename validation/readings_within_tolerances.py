@@ -25,7 +25,9 @@ from finger3d.mechanics.readings import Taxel
 from finger3d.sensor import Estimate, estimate
 
 from ._press import changed, converged, fig9_model
-from ._rows import Result, Row, at_least, at_most, columns, rms
+from ._rows import Result, Row, columns, listed, rms
+
+judged = listed(__file__)
 
 Domain = Literal["solid", "plane-strain"]
 
@@ -129,31 +131,23 @@ def _rows(found: list[Judged], kind_of_all: Literal["verification", "statement"]
                 (f"mu above {PLATEAU:g}", [one for one in some if one.mu > PLATEAU], "statement"),
             ):
                 inside = float(np.mean([one.inside for one in chosen]))
-                yield at_least(f"share of 90 % sets that contain mu: {name}, {part}, {len(chosen)} readings",
-                               "0.9 if stated rightly", 0.85, inside,
-                               "where the sensor saturates, an error of the reading looks like another mu",
-                               kind)  # fmt: skip
+                row = judged("share-of-sets-in-range", inside, name=name, part=part, count=len(chosen))
+                yield replace(row, kind=kind)
             share = float(np.mean([one.status in ("ok", "coarse") for one in some]))
-            yield at_most(f"share of readings that determine mu: {name}", "no reference", 1.0, share,
-                          "the others say above, below, blind or ambiguous", "statement")  # fmt: skip
+            yield judged("share-that-determines-mu", share, name=name)
             wrong = float(np.mean([one.status in ("outside", "contradiction") for one in some]))
-            yield at_most(f"share of readings called out of range or contradictory: {name}", "p = 0.001", 0.02, wrong,
-                          "all are presses of a sensor within its tolerances")  # fmt: skip
+            yield judged("share-out-of-range", wrong, name=name)
 
 
 def _honest(name: str, some: list[Judged], kind: Literal["verification", "statement"]) -> Iterator[Row]:
     """Yield whether z and the 90 % sets are as stated; a group of 12 or 48 presses alone is too few to verify it."""
     z = np.array([one.z for one in some if math.isfinite(one.z)])
     inside = float(np.mean([one.inside for one in some]))
-    why = "goal of this project; readings of one press share its error"
+    words = {"name": name, "known": len(z), "count": len(some)}
+    rows = [judged("share-of-sets-not-below", inside, **words), judged("share-of-sets-not-above", inside, **words)]
     if len(z) >= FEWEST:
-        what = f"rms of z of mu, not {{}}: {name}, {len(z)} of {len(some)} with an estimate"
-        one = "1 if stated rightly"
-        yield at_most(what.format("above"), one, 1.2, rms(z), why, kind)
-        yield at_least(what.format("below"), one, 0.8, rms(z), why, kind)
-    what = f"share of 90 % sets that contain mu: {name}, {len(some)} readings"
-    yield at_least(f"{what}, not below", "0.9 if stated rightly", 0.85, inside, why, kind)
-    yield at_most(f"{what}, not above", "0.9 if stated rightly", 0.95, inside, why, kind)
+        rows = [judged("z-not-above", rms(z), **words), judged("z-not-below", rms(z), **words), *rows]
+    yield from (replace(row, kind=kind) for row in rows)
 
 
 def _draw(figure: Any, found: list[Judged]) -> None:

@@ -27,16 +27,15 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import State
 from finger3d.mechanics.march.equilibrium import frictional_dissipation
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg
 from finger3d.objects import Cylinder, Move, ObjectPose
 
-from ._press import changed, converged
+from ._press import block_model, changed, converged
 from ._rows import Result, Row, exact_columns, grouped, listed
 
 judged = listed(__file__)
@@ -44,7 +43,6 @@ judged = listed(__file__)
 R, DEPTH, WAY, MU, E = 10.0, 0.05, 6.0, 1.0, 1.0
 BEGIN = -0.5 * WAY
 CREEPS = (0.0, 0.25, 0.5, 0.75, 1.0)
-CARTER = "Carter 1926; REFERENCES.md, 3.4"
 
 
 @dataclass(frozen=True)
@@ -80,12 +78,10 @@ class Travel:
 
 def block(nu: float, size: float, height: float, domain: Any = "plane-strain") -> Problem:
     """A block with the contact fine along the way."""
-    solid = domain == "solid"
-    design = designs()["block"](half_length_mm=2.0 * height, height_mm=height, width_mm=2.0 if solid else 1.0)
+    width, base = (2.0, 1.5) if domain == "solid" else (1.0, 2.0)
     legs = (Leg(DEPTH, steps=10), Leg(DEPTH, slide_x_mm=WAY))
-    mesh = MeshOptions(size, 1.5 if solid else 2.0, "swept")
-    thing = Cylinder(BEGIN, radius_mm=R)
-    return build(Model(design, Isotropic(E, nu), mesh, legs, object=thing, friction=Coulomb(MU), domain=domain))
+    more = {"object": Cylinder(BEGIN, radius_mm=R), "friction": Coulomb(MU), "domain": domain}
+    return build(block_model((2.0 * height, height, width), Isotropic(E, nu), (size, base), legs, **more))
 
 
 def pressed(problem: Problem) -> State[Any]:
@@ -138,9 +134,8 @@ def run(quick: bool) -> Result:
     found = {c: travel(problem, start, WAY, -WAY / R / (1.0 + c * MU * a / R), steps) for c in creeps}
     rows = []
     for creep, one in found.items():
-        what = f"Q/mu P, creep {creep:g} mu a/R, edges of a/{a / size:.0f}"
-        why = f"the surface of a block of the height h is strained: 2 a/h with a/h = {a / height:.3f}"
-        rows.append(Row(what, CARTER, carter(creep), one.steady / MU, 2.0 * a / height, why, measure="absolute"))
+        words = {"creep": creep, "edges": a / size, "share": a / height}
+        rows.append(judged("carter", one.steady / MU, carter(creep), 2.0 * a / height, **words))
     other = block(0.3, size, height)
     backwards = travel(other, pressed(other), WAY, -WAY / R, steps)
     rows += [
@@ -192,9 +187,9 @@ def _exact(problem: Problem, name: str, size: float, steps: int) -> list[Row]:
     aside, across = (1e-4, "points also slip along z, by Poisson's effect") if solid else (1e-8, "the residual")
     rows = [
         judged("torque-over-r-p-without-friction", float(np.abs(free.torque / R / free.normal).max()), tolerance=flat),
-        Row("Q/mu P, turned without travel", "Coulomb", -1.0, float(turned.ratio[-1] / mu), aside, across),
+        judged("turned-without-travel", turned.ratio[-1] / mu, tolerance=aside, why=across),
         judged("torque-mu-p-r-turned-without", float(turned.torque[-1] / (R * turned.normal[-1] * mu)), tolerance=flat),
-        Row("Q/mu P, slid without a turn", "Coulomb", 1.0, float(slid.ratio[-1] / mu), aside, across),
+        judged("slid-without-a-turn", slid.ratio[-1] / mu, tolerance=aside, why=across),
         judged("sum-of-friction-over-mu-p", float((slid.friction / slid.normal)[-1] / mu)),
         judged("largest-difference-of-torque-r-and", apart, tolerance=flat),
         judged("dissipation-of-sliding-over-the-work", spent, tolerance=way / steps),

@@ -20,12 +20,13 @@ import numpy as np
 from finger3d._machine import cores
 
 from ._child import Bench, available_gb, best_of
-from ._rows import GOAL, Result, Row, at_least, at_most, grouped, of_records
+from ._rows import Result, Row, grouped, listed, of_records
 from ._scaling import BODIES, STAGES, Size, sweep_seconds
 
 Runs = Mapping[Size, dict[str, Any]]
 
 BY_NAME = True
+judged = listed(__file__)
 LIMITS_MB = {40_000: 2_000.0, 160_000: 5_000.0, 1_000_000: 20_000.0}
 CONTACT_LIMIT = 10_000, 180.0  # rows, and seconds of ten increments
 UNKNOWNS = (Size(2.4, 9.6), Size(1.25, 5.0), Size(0.95, 3.8), Size(0.73, 2.92), Size(0.95, 1.25), Size(0.95, 0.98),
@@ -42,11 +43,11 @@ def run(quick: bool) -> Result:
     with Bench("_scaling") as bench:
         wanted = lambda s: 1 if quick or s > 8.0 else 2  # noqa: E731
         runs = best_of(bench, "pressed", dict.fromkeys([*unknowns, *rows]), wanted)
-    judged = [*_memory_rows(runs), *_contact_rows(runs), *_growth_rows(runs, unknowns, quick)]
-    judged += _one_factorisation(runs)
-    judged += [] if quick or cores() < 2 else _workers()
+    found = [*_memory_rows(runs), *_contact_rows(runs), *_growth_rows(runs, unknowns, quick)]
+    found.append(judged("factorisations", max(run["factorizations"] for run in runs.values())))
+    found += [] if quick or cores() < 2 else _workers()
     table = _table(runs, unknowns, rows)
-    return Result(tuple(judged), table, lambda figure: _draw(figure, table))
+    return Result(tuple(found), table, lambda figure: _draw(figure, table))
 
 
 def _sizes(quick: bool) -> tuple[list[Size], list[Size]]:
@@ -62,25 +63,21 @@ def _memory_rows(runs: Runs) -> Iterator[Row]:
     for dofs, limit in LIMITS_MB.items():
         found = sorted((r["dofs"], r["peak_MB"]) for r in runs.values() if r["dofs"] >= dofs)
         if found:
-            what = f"peak memory (MB), {found[0][0]} unknowns, all stages and output"
-            yield at_most(what, GOAL, limit, found[0][1], kind="validation")
+            yield judged("peak-memory", found[0][1], limit, unknowns=found[0][0])
 
 
 def _contact_rows(runs: Runs) -> list[Row]:
     """The time of the smallest contact that has as many rows as the limit speaks of."""
     least, limit = CONTACT_LIMIT
     found = sorted((r["rows"], r["seconds"]["contact"]) for r in runs.values() if r["rows"] >= least)
-    if not found:
-        return []
-    what = f"contact of ten increments (s), {found[0][0]} rows"
-    return [at_most(what, GOAL, limit, found[0][1], kind="validation")]
+    return [judged("contact-of-ten-increments", seconds, limit, rows=rows) for rows, seconds in found[:1]]
 
 
 def _growth_rows(runs: Runs, unknowns: Sequence[Size], quick: bool) -> list[Row]:
     """Exponents over the larger sizes, at most those of theory."""
     if quick:
         force = [runs[s]["force"] for s in unknowns]
-        return [Row("force (N) on the two meshes", "each other", force[1], force[0], 0.03, "coarse", "verification")]
+        return [judged("force-on-two-meshes", force[0], force[1])]
     big = [s for s in unknowns if runs[s]["dofs"] > 30_000]
     dofs = np.log([runs[s]["dofs"] for s in big])
 
@@ -89,30 +86,18 @@ def _growth_rows(runs: Runs, unknowns: Sequence[Size], quick: bool) -> list[Row]
 
     assembly, factor = (growth([runs[s]["processor_seconds"][k] for s in big]) for k in ("assembly", "condensation"))
     memory = growth([runs[s]["peak_MB"] for s in big])
-    why = "processor times of a shared machine scatter"
     return [
-        Row("assembly grows as unknowns to the power", "one visit to each cell", 1.0, assembly, 0.25, why, "validation",
-            "at most"),
-        Row("condensation grows as unknowns to the power", "George 1973: 2", 2.0, factor, 0.25, why, "validation",
-            "at most"),
-        Row("peak memory grows as unknowns to the power", "George 1973: 4/3", 4.0 / 3.0, memory, 0.1,
-            "rows of the Schur complement come on top", "validation", "at most"),
-    ]  # fmt: skip
+        judged("growth-of-assembly", assembly),
+        judged("growth-of-condensation", factor),
+        judged("growth-of-memory", memory, 4.0 / 3.0),
+    ]
 
 
 def _workers() -> list[Row]:
     # in turn, and the shorter time of each counts: what others do on the machine only ever makes it longer
     tries = [[sweep_seconds(SWEPT, count) for count in (1, 2)] for _ in range(WORKER_TRIES)]
     one, two = (min(times) for times in zip(*tries, strict=True))
-    what = f"times faster with two local workers, {BODIES} bodies of 31 446 unknowns"
-    why = f"the whole command with its start; {one:.0f} s by one worker, the shortest of {WORKER_TRIES}"
-    return [at_least(what, GOAL, 1.7, one / two, why, "validation")]
-
-
-def _one_factorisation(runs: Runs) -> list[Row]:
-    worst = max(r["factorizations"] for r in runs.values())
-    what = "factorisations a press, for every size"
-    return [at_most(what, "one condensation serves all increments", 1.0, float(worst), "a count")]
+    return [judged("two-workers", one / two, bodies=BODIES, seconds=one, tries=WORKER_TRIES)]
 
 
 def _table(runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size]) -> dict[str, Any]:

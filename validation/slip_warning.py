@@ -29,10 +29,10 @@ from finger3d._types import Float
 from finger3d.analyses.press import press
 
 from ._press import block_tables
-from ._rows import Result, Row, Settled, at_most, columns, settled, zero
+from ._rows import Result, Row, Settled, columns, listed, settled
 
-CONE = "friction cone, as in Higuera et al. 2024; REFERENCES.md, 3.6"
-MINDLIN = "Mindlin 1949; REFERENCES.md, 3.2"
+judged = listed(__file__)
+
 MU = 0.5
 THRESHOLD = 0.02
 """Share of the friction cone that is left where its bit says slip."""
@@ -138,11 +138,10 @@ def run(quick: bool) -> Result:
         found.append(slid("ball, large deformation", large, 0.5, 1.6, steps, 0.5))
     shallow = slid("shallow ball", ball(12.0, 0.2 * coarser, 6.0), 0.02, 0.12, 12, 0.3)
     rows += [row for one in found for row in _warnings(one)]
-    why = "the contact's radius a is .3 of the pad's thickness, and half an edge at the border of stick is .1 of a"
-    what = "stick ratio by area less margin^(2/3), the largest"
-    rows.append(zero(f"{what}, shallow ball", MINDLIN, shallow.from_mindlin, 0.1 * coarser, why))
-    deep = "the contact's radius is .6 of the pad's thickness, and the rim slips while it is pressed"
-    rows.append(zero(f"{what}, ball", MINDLIN, found[0].from_mindlin, 0.1 * coarser, deep, "statement"))
+    rows += [
+        judged("stick-ratio-under-shallow-ball", shallow.from_mindlin, tolerance=0.1 * coarser),
+        judged("stick-ratio-under-ball", found[0].from_mindlin, tolerance=0.1 * coarser),
+    ]
     every = [*found, shallow]
     names = "scene slide_mm gross_slip_mm stick_ratio_area stick_ratio_force slip_margin normal_force_N "
     table = columns(names + "tangential_force_N cone", [line for one in every for line in _lines(one)])
@@ -155,23 +154,18 @@ def _lines(one: Slide) -> Iterator[tuple[Any, ...]]:
 
 
 def _same_gross_slip(few: Slide, many: Slide, increment_mm: float) -> Row:
-    counts = [len(one.slide_mm) - 1 for one in (few, many)]
-    what = f"gross slip in {counts[0]} increments less that in {counts[1]}, over one of {counts[0]}, {few.name}"
+    fewer, more = (len(one.slide_mm) - 1 for one in (few, many))
     apart = abs(few.gross_mm - many.gross_mm) / increment_mm
-    return zero(what, "more increments", apart, 1.0, "one increment: where in it the contact slips is not known")
+    return judged("gross-slip", apart, fewer=fewer, more=more, name=few.name)
 
 
 def _warnings(one: Slide) -> Iterator[Row]:
     """How early each number warns, and the bit of the friction cone."""
     bit = one.falls("cone", THRESHOLD)
     for name, level in LEVELS:
-        what = f"{NAMES[name]} has fallen to {level:g}: slide over that of gross slip, {one.name}"
-        yield at_most(what, CONE, bit, one.falls(name, level), "before the bit of the friction cone", "statement")
+        yield judged("warning", one.falls(name, level), bit, number=NAMES[name], level=level, name=one.name)
     step = float(one.slide_mm[-1] - one.slide_mm[-2]) / one.gross_mm
-    yield Row(
-        f"bit of the friction cone: slide over that of gross slip, {one.name}", CONE, 1.0, bit, step, "one increment",
-        "statement",
-    )  # fmt: skip
+    yield judged("bit-of-the-friction-cone", bit, tolerance=step, name=one.name)
 
 
 def _draw(figure: Any, found: list[Slide]) -> None:

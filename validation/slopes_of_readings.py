@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -26,30 +26,18 @@ from finger3d._types import Float
 from finger3d.analyses.pressed_body import presses
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 
-from ._press import fig9_finger
-from ._rows import Result, Row, columns, listed
+from ._press import PAPER_GAUGE, fig9_finger
+from ._rows import Result, Row, columns, given, listed
 
 judged = listed(__file__)
 
 SECTION, SWEPT, WILD = "section", "20 mm wide, swept", "20 mm wide, fTetWild"
 EVEN = "20 mm wide, swept, base edges twice as long"
-CASES: dict[str, tuple[Domain, Literal["swept", "ftetwild"], float]] = {
-    SECTION: ("plane-strain", "swept", 4.0),
-    SWEPT: ("solid", "swept", 4.0),
-    EVEN: ("solid", "swept", 2.0),
-    WILD: ("solid", "ftetwild", 4.0),
-}
-"""Domain, mesher, and the edge length at the base over that at the contact."""
-
+CASES = {case["name"]: case for case in given(__file__)["case"]}
+"""Domain, mesher, edge lengths at the contact, mm, and those at the base over these."""
 PLAIN, REFINED = 1.0, 2.0
-SIZES = {
-    SECTION: (4.0, 2.0, 1.0, 0.5, 0.25),
-    SWEPT: (4.0, 2.8, 2.0, 1.4, 1.0, 0.7),
-    EVEN: (2.0, 1.4, 1.0, 0.7),
-    WILD: (4.0, 2.8, 2.0, 1.4),
-}
 QUICK = {SECTION: (1.0, 0.5)}
 ENDS = np.linspace(0.05, 1.05, 11)
 MUS = 0.5 * (ENDS[1:] + ENDS[:-1])
@@ -80,10 +68,10 @@ Curves = dict[tuple[str, float, float], Curve]
 
 def curve(case: str, refinement: float, size: float, steps: int) -> Curve:
     """Return the strain of the gauge over mu on a mesh."""
-    domain, mesher, growth = CASES[case]
+    domain, mesher, growth = (CASES[case][key] for key in ("domain", "mesher", "growth"))
     mesh = MeshOptions(size, growth * size, mesher, gauge_refinement=refinement)
-    gauge = Gauge("g", 36.0, 40.0, angle=math.radians(30.0))
-    model = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, (Leg(10.0, steps=steps),), gauges=(gauge,), domain=domain)
+    legs, gauges = (Leg(10.0, steps=steps),), (PAPER_GAUGE,)
+    model = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, gauges=gauges, domain=domain)
     problem = build(model)
     ends = [press.frame for press in presses(problem, ENDS.tolist())]
     strain = [end.gauges["g"] if end.outcome.ok else math.nan for end in ends]
@@ -93,9 +81,10 @@ def curve(case: str, refinement: float, size: float, steps: int) -> Curve:
 def run(quick: bool) -> Result:
     """Quick: the section on two meshes, in ten increments."""
     steps = QUICK_STEPS if quick else STEPS
+    wanted = QUICK if quick else {name: case["sizes_mm"] for name, case in CASES.items()}
     found: Curves = {
         (case, refinement, size): curve(case, refinement, size, steps)
-        for case, sizes in (QUICK if quick else SIZES).items()
+        for case, sizes in wanted.items()
         for refinement in ((REFINED,) if case == EVEN else (PLAIN, REFINED))
         for size in sizes
     }

@@ -39,21 +39,19 @@ from finger3d.meshing.mesh_files import write_mesh_vtu
 from finger3d.scene import scene_of
 
 from ._press import block_tables
-from ._rows import Result, Row, Settled, at_least, at_most, columns, grouped, settled
+from ._rows import Result, Row, Settled, columns, given, grouped, listed, settled
 
-SOURCE = "tutorials of solids4foam; REFERENCES.md, 6.7"
-LARGE = {"large_deformation": {}}
-CORNERS = np.array([[0, 0], [6.5, 0], [5.5, 2], [0, 2], [8.735, 0], [7.735, 2], [3, 7], [5.235, 7], [2, 9], [4.235, 9],
-                    [0, 7], [0, 9]])  # fmt: skip
-BLOCKS = (((0, 1, 2, 3), 12, 6), ((1, 4, 5, 2), 6, 6), ((2, 5, 7, 6), 6, 12), ((10, 6, 8, 11), 7, 6),
-          ((6, 7, 9, 8), 6, 6))  # fmt: skip
-"""Corners of the right half of the seal, mm; its blocks and the cells along their sides, as in the tutorial."""
+judged = listed(__file__)
+
+GIVEN = given(__file__)
+"""Tables of the scenes, and the right half of the seal: its corners, mm, and its blocks with the cells along their
+sides, as in the tutorial."""
+
+CORNERS = np.array(GIVEN["half_seal"]["corners"])
 WIDTH = 1.0
 """Of the seal, mm."""
 STOPS = {"seal": 0.5, "spheres": 0.75, "twist": 34.0 / 180.0}
 """Share of the way at which each stops there; of the twist, whose way is the turn, that up to which increments fail."""
-TORQUE = 0.401 / 1.289
-"""Torque over normal force, mm, at 180 degrees, of Sauer and De Lorenzis 2015, as digitised there."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,9 @@ class Case:
 
 def seal_mesh(coarser: float) -> Mesh:
     """Return the seal, of one layer of tetrahedra, with the cells of the tutorial or coarser ones."""
-    sheet = np.concatenate([_triangles(CORNERS[list(at)], n / coarser, m / coarser) for at, n, m in BLOCKS])
+    sheet = np.concatenate(
+        [_triangles(CORNERS[at], n / coarser, m / coarser) for at, n, m in GIVEN["half_seal"]["blocks"]]
+    )
     both = np.concatenate([sheet, sheet * [-1.0, 1.0]]).reshape(-1, 2).round(9)
     flat, index = np.unique(both, axis=0, return_inverse=True)
     low, n = np.sort(index.reshape(-1, 3), axis=1), len(flat)
@@ -110,15 +110,8 @@ def seal(coarser: float, steps: int, folder: Path) -> Model:
     """Return the seal pressed by 2.2 mm."""
     path = folder / "seal.vtu"
     write_mesh_vtu(path, seal_mesh(coarser))
-    tables = {
-        "finger": {"geometry": str(path)},
-        "material": {"E_MPa": 1.2673215, "nu": 0.4997887797},
-        "object": {"shape": "plane"},
-        "friction": {"mu": 1000.0},
-        "press": {"depth_mm": 2.2, "steps": steps},
-        "effects": LARGE,
-    }
-    return replace(scene_of(tables).model(), held_ends=True)
+    more = {"finger": {"geometry": str(path)}, "press": {"depth_mm": 2.2, "steps": steps}}
+    return replace(scene_of(GIVEN["seal"] | more).model(), held_ends=True)
 
 
 def spheres(size: float, steps: int, folder: Path) -> Model:
@@ -128,25 +121,14 @@ def spheres(size: float, steps: int, folder: Path) -> Model:
     path = folder / "sphere.step"
     outer, inner = (Rot(-90, 0, 0) * Sphere(r, arc_size1=0, arc_size2=90, align=None) for r in (14.0, 12.0))
     export_step(outer - inner, str(path))
-    tables = {
-        "finger": {"geometry": str(path), "up": "y"},
-        "material": {"E_MPa": 1.0, "nu": 0.3},
-        "object": {"shape": "plane"},
-        "friction": {"mu": 0.0},
-        "press": {"depth_mm": 10.0, "steps": steps},
-        "mesh": {"size_mm": size, "base_size_mm": size},
-        "effects": LARGE,
-    }
-    return scene_of(tables).model()
+    more = {"finger": {"geometry": str(path), "up": "y"}, "mesh": {"size_mm": size, "base_size_mm": size}}
+    return scene_of(GIVEN["spheres"] | more | {"press": {"depth_mm": 10.0, "steps": steps}}).model()
 
 
 def twist(size: float, press: int, turn: int) -> Model:
     """Return the cube with the ball, pressed and turned."""
     legs = [{"depth_mm": 1.0, "steps": press}, {"depth_mm": 1.0, "turn_y_deg": 180.0, "steps": turn}]
-    tables = block_tables(
-        (1.0, 2.0, 2.0), 1.0, 0.3, (size, 2.0 * size), object={"shape": "sphere", "radius_mm": 1.0},
-        friction={"mu": 0.5}, press={"leg": legs}, effects=LARGE,
-    )  # fmt: skip
+    tables = block_tables((1.0, 2.0, 2.0), 1.0, 0.3, (size, 2.0 * size), press={"leg": legs}, **GIVEN["twist"])
     return scene_of(tables).model()
 
 
@@ -178,22 +160,17 @@ def run(quick: bool) -> Result:
 
 
 def _rows(case: Case) -> Iterator[Row]:
-    good = case.settled
-    yield at_most(f"largest residual, {case.name}", "Eqs. 1 to 4", 1e-8, good.residual or 0.0, "what converged means")
+    yield judged("largest-residual", case.settled.residual or 0.0, name=case.name)
     last = case.steps[-1]
     ends = "" if last.outcome.ok else f"; ends there, {last.outcome}, {last.detail}"
-    yield at_least(
-        f"share of the way that settles, {case.name}{ends}", SOURCE, STOPS[case.name],
-        float(case.share[len(case.good) - 1]), "as far as there, at least", "statement",
-    )  # fmt: skip
+    share = case.share[len(case.good) - 1]
+    yield judged("share-of-the-way-that-settles", share, STOPS[case.name], name=case.name, ends=ends)
     if case.name == "seal":
         most = int(np.argmax([number["normal_force_N"] for number in case.numbers]))
-        yield at_least("share of the way at which the force is largest, seal", SOURCE, STOPS["seal"],
-                       float(case.share[most]), "an instability at half of the way", "statement")  # fmt: skip
+        yield judged("share-of-the-way-at-which-the-force-is-largest", case.share[most], STOPS["seal"])
     if case.name == "twist":
         got = abs(case.numbers[-1]["moment_y_Nmm"]) / case.numbers[-1]["normal_force_N"]
-        yield Row("torque over normal force at 180 degrees, mm, twist", f"Sauer and De Lorenzis 2015; {SOURCE}", TORQUE,
-                  got, 0.1, "the ball is rigid here", "statement")  # fmt: skip
+        yield judged("torque-over-normal-force", got)
 
 
 def _lines(case: Case) -> Iterator[tuple[Any, ...]]:

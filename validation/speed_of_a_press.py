@@ -25,7 +25,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg
 
 from ._paper import STRAIN, fig9, said
-from ._press import changed, under
+from ._press import PAPER_GAUGE, changed, under
 from ._rows import Result, Row, columns
 
 RATES = (0.02, 0.05, 0.1)
@@ -38,7 +38,7 @@ MU = 0.25
 MUS = (0.15, 0.2, 0.25, 0.3, 0.35)
 WIDE = "20 mm wide"
 GAUGES = {
-    STRAIN: Gauge("g", 36.0, 40.0, angle=math.radians(30.0)),
+    STRAIN: PAPER_GAUGE,
     WIDE: Gauge("g", 6.0, 46.5, angle=math.radians(85.0)),
 }
 DEPTH, FORCE = "same depth", "same force"

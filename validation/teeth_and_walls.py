@@ -25,7 +25,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.objects import MeshObject
 
-from ._press import converged
+from ._press import block_model, converged
 from ._rows import Result, listed, together
 from .triangulated_objects import of_trimesh
 
@@ -135,11 +135,8 @@ def slot(mouth: float, cavity: float, deep: float, lip: float = 0.0) -> Triangle
 
 def model(surface: Triangles, size: float, legs: tuple[Leg, ...], mu: float) -> Model:
     """A block in a slot, plane strain."""
-    block = designs()["block"](half_length_mm=HALF, height_mm=HEIGHT, width_mm=WIDTH)
-    return Model(
-        block, Isotropic(E, NU), MeshOptions(size, size, "swept"), legs, object=MeshObject(surface=surface),
-        friction=Coulomb(mu), domain="plane-strain", symmetry=(),
-    )  # fmt: skip
+    more = {"object": MeshObject(surface=surface), "friction": Coulomb(mu), "domain": "plane-strain", "symmetry": ()}
+    return block_model((HALF, HEIGHT, WIDTH), Isotropic(E, NU), (size, size), legs, **more)
 
 
 def confined(size: float) -> tuple[float, float, float]:

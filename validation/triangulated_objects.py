@@ -21,12 +21,11 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg
 from finger3d.objects import ContactPath, Cylinder, MeshObject, PlacedObject, RigidObject, Sphere, first_touch
 
 from ._common import convergence, rate
-from ._press import converged
+from ._press import block_model, measured
 from ._rows import Result, exact_columns, listed
 
 judged = listed(__file__)
@@ -61,10 +60,9 @@ def box(*half_edges: float) -> Triangles:
 
 def pressed(obj: RigidObject, size: float) -> float:
     """Normal force (N) of a press off the middle of a block."""
-    pad = designs()["block"](half_length_mm=5.0, height_mm=4.0, width_mm=8.0)
-    mesh, law = MeshOptions(size, 2.0, "swept"), Coulomb(0.3)
-    problem = build(Model(pad, Isotropic(1.0, 0.3), mesh, (Leg(0.4, steps=2),), object=obj, friction=law))
-    return float(measure(problem.points, converged(problem)[-1])["normal_force_N"])
+    more = {"object": obj, "friction": Coulomb(0.3)}
+    model = block_model((5.0, 4.0, 8.0), Isotropic(1.0, 0.3), (size, 2.0), (Leg(0.4, steps=2),), **more)
+    return float(measured(build(model))[-1]["normal_force_N"])
 
 
 def run(quick: bool) -> Result:

@@ -15,9 +15,7 @@ beads are predicted.
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,14 +26,14 @@ from finger3d._types import Float
 from finger3d.analyses.press import press
 
 from ._press import block_tables
-from ._rows import Result, Row, columns, listed
+from ._rows import Result, Row, columns, given, listed
 
 judged = listed(__file__)
 
 SIZE, NU, NOMINAL = 80.0, 0.499, np.array([0.05, 0.125, 0.1825])
 HEIGHTS = 10.0 * np.arange(1, 8)
 """Of the beads above the base, mm."""
-BEADS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+BEADS = given(__file__)
 AXIAL, ACROSS = (np.array([*BEADS[way].values()]) for way in ("axial", "across"))
 """(3, 7, 4) mm towards the base, beads on the left, at the centre, on the right, from the base up, at rest and pressed;
 and (2, 7, 4) mm across the slice, of the outer beads."""

@@ -28,7 +28,6 @@ from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import (
@@ -46,7 +45,7 @@ from finger3d.objects import (
 from finger3d.objects.rigid import rotation
 
 from ._common import Body, body, held_at, increment
-from ._press import converged
+from ._press import block_model, measured
 from ._rows import Result, exact_columns, listed, together
 from .triangulated_objects import ball
 
@@ -92,17 +91,14 @@ def pressed(obj: RigidObject, domain: Domain) -> Model:
     """A block under an object that is pressed, then dragged and twisted."""
     solid = domain == "solid"
     away = {"slide_x_mm": 0.1, "slide_z_mm": 0.05, "turn_y": 0.05} if solid else {"slide_x_mm": 0.1, "turn_z": 0.02}
-    block = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=6.0)
-    mesh = MeshOptions(1.0 if solid else 0.4, 1.5, "swept")
-    legs = (Leg(0.3, steps=2), Leg(0.3, steps=2, **away))
-    return Model(block, Isotropic(1.0, 0.4), mesh, legs, object=obj, friction=Coulomb(0.3), domain=domain, symmetry=())
+    edges, legs = (1.0 if solid else 0.4, 1.5), (Leg(0.3, steps=2), Leg(0.3, steps=2, **away))
+    more = {"object": obj, "friction": Coulomb(0.3), "domain": domain, "symmetry": ()}
+    return block_model((4.0, 3.0, 6.0), Isotropic(1.0, 0.4), edges, legs, **more)
 
 
 def wrench(model: Model) -> Float:
     """Force (N) and moment (N mm) on the finger at the end."""
-    problem = build(model)
-    last = converged(problem)[-1]
-    found = measure(problem.points, last)
+    found = measured(build(model))[-1]
     return np.array([found[name] for name in WRENCH])
 
 

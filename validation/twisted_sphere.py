@@ -25,16 +25,15 @@ from scipy.special import ellipe, ellipkm1
 
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg
 from finger3d.objects import Move, ObjectPose, Sphere
 
-from ._press import changed, converged
+from ._press import block_model, changed, converged
 from ._rows import Result, exact_columns, grouped, listed
 
 judged = listed(__file__)
@@ -49,10 +48,9 @@ STUCK = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)  # c/a
 
 def block(size: float) -> Problem:
     """A block of 12 a by 6 a by 12 a under the ball."""
-    design = designs()["block"](half_length_mm=6.0, height_mm=6.0, width_mm=12.0)
     legs = (Leg(DEPTH, steps=1), Leg(DEPTH, steps=1, turn_y=TURNED))
-    mesh = MeshOptions(size, 2.0, "swept")
-    return build(Model(design, Isotropic(E, NU), mesh, legs, object=Sphere(radius_mm=RADIUS)))
+    ball = Sphere(radius_mm=RADIUS)
+    return build(block_model((6.0, 6.0, 12.0), Isotropic(E, NU), (size, 2.0), legs, object=ball))
 
 
 def twisted(problem: Problem, mu: float, angle: float, steps: int) -> list[tuple[float, float, float, float]]:

@@ -30,7 +30,9 @@ from finger3d.objects import ObjectPose
 from ._increments import PlainCoulomb
 from ._paper import STRAIN, STRESS, fig9, said
 from ._press import changed
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, columns, listed
+
+judged = listed(__file__)
 
 WIDE = "20 mm wide"
 MODELS = ((STRESS, 0.3), (STRAIN, 0.3), (STRAIN, 0.49), (WIDE, 0.3), (WIDE, 0.49))
@@ -132,15 +134,14 @@ def _rows(found: Sequence[Searched]) -> Iterator[Row]:
         for text, some in (("up to 1", [s for s in own if s.mu <= 1.0]), ("above 1", [s for s in own if s.mu > 1.0])):
             tried = sum(s.solved + s.others + s.unsettled for s in some)
             yield said("unique", sum(s.others for s in some), tried=tried, range=text, model=model)
-            what = f"random starts that end in no solution, of {tried}, mu {text}, {model}"
-            unsettled = sum(s.unsettled for s in some)
-            yield at_most(what, "no reference", 0.0, unsettled, "the fallbacks start from any forces", "statement")
+            yield judged("no-solution", sum(s.unsettled for s in some), tried=tried, range=text, model=model)
 
 
-def _one_point(random: np.random.Generator, loads: int) -> Iterator[Row]:
+def _one_point(random: np.random.Generator, loads: int) -> list[Row]:
     """Loads that nearly close a gap of one point, K = [[1, .8], [.8, 2]] (t, n): several solutions above mu = 1.25."""
     compliance = np.linalg.inv(np.array([[2.0, 0.8], [0.8, 1.0]])).reshape(1, 2, 1, 2)
-    for mu, most in ((1.2, 0), (2.0, loads)):
+    found = []
+    for mu in (1.2, 2.0):
         several = 0
         for gap, slip in random.uniform((0.005, 0.3), (0.03, 0.5), size=(loads, 2)):
             free = np.array([[gap, -slip]])
@@ -150,11 +151,11 @@ def _one_point(random: np.random.Generator, loads: int) -> Iterator[Row]:
             ends = [solve_increment(problem, np.abs(guess) * [1.0, np.sign(guess[0, 1])]) for guess in guesses]
             forces = np.array([end.state.force[0] for end in ends if end.outcome.ok])
             several += bool(len(forces) and np.ptp(forces, axis=0).max() > DIFFERENT)
-        what = f"loads with several solutions found, one point, mu = {mu:g}, of {loads}"
-        if most:
-            yield at_least(what, "REFERENCES.md, 8.1: some above mu = 1.25", 1, several, "the search finds them")
-        else:
-            yield at_most(what, "REFERENCES.md, 8.1: none below mu = 1.25", 0, several, "the solution is unique")
+        found.append(several)
+    return [
+        judged("one-point-below-the-limit", found[0], loads=loads),
+        judged("one-point-above-the-limit", found[1], loads=loads),
+    ]
 
 
 def _draw(figure: Any, found: Sequence[Searched]) -> None:

@@ -46,7 +46,7 @@ DEPTH = 1.0 / RADIUS  # a = 1 mm
 PRONY = ((0.5, 1.0),)
 TABLE = {0.1: 0.0310080, 0.25: 0.1191727, 0.5: 0.3227350, 1.0: 0.8464404, 1.5: 0.7101267, 4.0: 0.5172483}
 HELD, RELEASED = 1.5, 0.8  # s; the ball is drawn back for so long
-LEE = "Lee and Radok 1960; REFERENCES.md, 4.1"
+
 HALF = "0.01 % or less measured on rings of a/100, 0.2 % or less on tetrahedra of a/10"
 COLUMNS = "body nu bulk resolution steps_per_s t P_over_k theory a"
 
@@ -199,7 +199,7 @@ def _ring_rows(curves: dict[str, Any], count: int, quick: bool) -> Iterator[Row]
     why = "coarse rings and increments of the quick version" if quick else HALF
     for when, want in TABLE.items():
         if not (quick and when == 0.25):  # lies between two increments
-            yield Row(f"P/k at t = {when:g} s, rings", LEE, want, _at(force, t, when), worst, why)
+            yield judged("p-over-k", _at(force, t, when), want, worst, when=when, why=why)
     yield judged("a-sqrt-r-d-at-t", _at(radius, t, 1.0), tolerance=1.0 / count, count=count)
     t, force, radius = curves["release"]
     for when in (1.6, 1.75):
@@ -226,14 +226,14 @@ def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool
             for t, p, a in zip(times, force / elastic * np.minimum(times, 1.0) ** 1.5, radius, strict=True):
                 table.append(("tets", 0.3, bulk, points, per_second, t, p, lee_radok(t, relax), a))
     limit, why = (0.02, "three points to a in the quick version") if quick else (0.005, HALF)
-    for bulk, relax, source, kind in (
-        (True, modulus, LEE, ""),
-        (False, contact_modulus(0.3), "Lee and Radok 1960 with E*(s); REFERENCES.md, 4.1", ", K constant"),
+    for bulk, relax, of, kind in (
+        (True, modulus, "", ""),
+        (False, contact_modulus(0.3), " with E*(s)", ", K constant"),
     ):
         for when in (0.4, 1.0) if quick else (0.1, 0.25, 0.5, 1.0, 1.5, 4.0):
             wanted, got = lee_radok(when, relax) / min(when, 1.0) ** 1.5, _at(found[meshes[-1], bulk], times, when)
-            what = f"P/P_elastic(depth) at t = {when:g} s{kind}, tets a/{meshes[-1]}"
-            yield Row(what, source, wanted, got, limit, why)
+            words = {"when": when, "kind": kind, "points": meshes[-1], "of": of, "why": why}
+            yield judged("p-over-elastic", got, wanted, limit, **words)
 
 
 def _draw(figure: Any, curves: dict[str, Any], columns: dict[str, list[Any]]) -> None:

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import sys
 import time
-import tomllib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,11 +20,11 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.scene import Scene, parse
 
-from ._rows import Result, Row, exact_columns, listed
+from ._rows import Result, Row, exact_columns, given, listed
 
 judged = listed(__file__)
 
-GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+GIVEN = given(__file__)
 SETTINGS, LABELS = ({name: one[key] for name, one in GIVEN["effect"].items()} for key in ("settings", "label"))
 QUANTITIES = ("force", "contact_length", "stick", "friction_sum", "gauge_strain")
 DOMAINS = ("plane-strain", "solid")
