@@ -51,15 +51,16 @@ SECTION = {
 NUMBERS = ["normal_force_N", "friction_sum_N", "gauge_g36"]
 
 
-def differences(given: Any, key: str, value: float, change: float, number: str, *overrides: str) -> tuple[float, float]:
-    """Changes of a number in presses of their own, as a key falls and as it grows."""
+def differences(given: Any, key: str, value: float, change: float, *overrides: str) -> dict[str, tuple[float, float]]:
+    """Changes of numbers in presses of their own, as a key falls and as it grows."""
 
-    def at(x: float) -> float:
+    def at(x: float) -> dict[str, float]:
         last = finger3d.press(given, error=False, overrides=[f"{key}={x!r}", *overrides]).last
-        return last.gauges["g36"] if number == "gauge_g36" else getattr(last, number)
+        forces = {"normal_force_N": last.normal_force_N, "friction_sum_N": last.friction_sum_N}
+        return forces | {f"gauge_{name}": strain for name, strain in last.gauges.items()}
 
-    own = at(value)
-    return at(value - change) - own, at(value + change) - own
+    own, less, more = at(value), at(value - change), at(value + change)
+    return {number: (less[number] - x, more[number] - x) for number, x in own.items()}
 
 
 @pytest.mark.parametrize(
@@ -74,10 +75,11 @@ def test_effects_are_differences_of_presses(effects: dict[str, Any]) -> None:
     found = finger3d.sensitivity(given, NUMBERS)
     # a scene of another depth has another mesh, so that the depth is not among these
     for key in ("friction.mu", "gauge.g36.angle_deg", "material.E_MPa", "material.nu"):
+        wanted = differences(given, key.replace("g36", "0"), found.keys[key], found.changes[key])
         for number in NUMBERS:
-            wanted = differences(given, key.replace("g36", "0"), found.keys[key], found.changes[key], number)
             effect, size = found.effects[number][key], abs(found.numbers[number])
-            assert (effect.falling, effect.growing) == pytest.approx(wanted, rel=1e-4, abs=1e-7 * size), (key, number)
+            expected = pytest.approx(wanted[number], rel=1e-4, abs=1e-7 * size)
+            assert (effect.falling, effect.growing) == expected, (key, number)
 
 
 @pytest.mark.slow
@@ -124,7 +126,7 @@ def test_moduli_times_and_durations_of_a_viscous_press_have_effects() -> None:
     given = scene(**SECTION | slow)
     found = finger3d.sensitivity(given, ["normal_force_N"])
     for key in ("effects.viscosity.prony.0.0", "effects.viscosity.prony.0.1", "press.duration_s"):
-        wanted = differences(given, key, found.keys[key], found.changes[key], "normal_force_N")
+        wanted = differences(given, key, found.keys[key], found.changes[key])["normal_force_N"]
         effect = found.effects["normal_force_N"][key]
         assert (effect.falling, effect.growing) == pytest.approx(wanted, rel=1e-6)
 

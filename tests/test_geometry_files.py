@@ -268,7 +268,7 @@ def test_press_takes_a_finger_and_an_object_from_files(drawn: Path, tmp_path: Pa
     scene.write_text(
         f'effects.auto = false\n[finger]\ngeometry = "{drawn}/finger.step"\n[material]\nE_MPa = 1.0\n'
         'nu = 0.3\n[press]\ndepth_mm = 0.6\nsteps = 2\n[object]\nshape = "mesh"\npath = "plate.stl"\n'
-        "[mesh]\nsize_mm = 1.2\nbase_size_mm = 3.0\n",
+        "[mesh]\nsize_mm = 1.6\nbase_size_mm = 4.0\n",
         encoding="utf-8",
     )
     assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0, capsys.readouterr().err
@@ -289,7 +289,7 @@ def test_press_takes_a_finger_and_an_object_from_files(drawn: Path, tmp_path: Pa
             **HALF_CYLINDER,
             "finger": design,
             "press": {"depth_mm": 0.6, "steps": 2},
-            "mesh": {"size_mm": 1.2, "base_size_mm": 3.0, "mesher": "swept"},
+            "mesh": {"size_mm": 1.6, "base_size_mm": 4.0, "mesher": "swept"},
         }
     )
     from finger3d.mechanics.discretise.build import build
