@@ -124,18 +124,26 @@ def spread_error(
         Errors in the units of the numbers; names without a finite error are left out.
     """
     kinds, told = kinds_of(readings), list(companions)
-    all_stick = numbers.get("stick_ratio_area", 0.0) >= 1.0 - _NOTHING
     found = {}
     for name, value in numbers.items():
         bar = spread(kinds[name], value, [(ratio, other[name]) for ratio, other in told])
-        scale = scale_of(numbers, kinds, name)
-        if kinds[name] is Kind.DISSIPATION and abs(value) < scale:  # nothing slips
-            scale *= _LEAST_SLIP
-        least = _LEAST_OF_ZONES if kinds[name].is_zone else _LEAST
-        if all_stick and kinds[name].is_stick:
-            least = _LEAST_OF_STICK
-        found[name] = max(bar, least * spacing * scale)
+        found[name] = max(bar, least_error(numbers, kinds, name, spacing))
     return {name: error for name, error in found.items() if math.isfinite(error)}
+
+
+def least_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str, spacing: float) -> float:
+    """Return the error that the distance of the contact points leaves open, whatever other meshes say.
+
+    Parameters
+    ----------
+    spacing : distance of the contact points over the half-length of contact, see `spacing`
+    """
+    scale, kind = scale_of(numbers, kinds, name), kinds[name]
+    if kind is Kind.DISSIPATION and abs(numbers[name]) < scale:  # nothing slips
+        scale *= _LEAST_SLIP
+    all_stick = numbers.get("stick_ratio_area", 0.0) >= 1.0 - _NOTHING
+    least = _LEAST_OF_STICK if all_stick and kind.is_stick else _LEAST_OF_ZONES if kind.is_zone else _LEAST
+    return least * spacing * scale
 
 
 _ROUND_OFF = 1e-15

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finger3d._types import Tree, TreeView
-from finger3d.accuracy.error_bars import spread_error
+from finger3d.accuracy.error_bars import least_error, spacing, spread_error
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.analyses.calibrate import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.free_keys import scene_with, settled
@@ -27,7 +27,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.march.variants import press_variants
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings import Column, in_space, quantities
+from finger3d.mechanics.readings import Column, in_space, kinds_of, quantities
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
 from finger3d.scene.material import with_moduli_only
@@ -238,18 +238,26 @@ Side = dict[str, float] | str
 
 
 class Differences(NamedTuple):
-    """Numbers of a press, its readings, and the changes of the numbers as each key falls (0) and grows (1)."""
+    """Numbers of a press, its readings and spacing, and the changes of numbers as each key falls (0) and grows (1)."""
 
     numbers: dict[str, float]
     readings: list[Column]
+    spacing: float
     changed: dict[tuple[str, int], Side]
 
 
 def _errors(own: Differences, others: Sequence[tuple[float, Differences]], at: tuple[str, int]) -> dict[str, float]:
-    """Return the errors of the changes by a key, from those on other meshes."""
-    side = own.changed[at]
+    """Return the errors of the changes by a key, from those on other meshes.
+
+    The border of stick moves past the contact points by fits: a change of its zone that is known has the least error of
+    the zone.
+    """
+    side, kinds = own.changed[at], kinds_of(own.readings)
     known = [(ratio, told) for ratio, other in others if isinstance(told := other.changed[at], dict)]
-    return spread_error(side, known, own.readings) if isinstance(side, dict) and known else {}
+    found = spread_error(side, known, own.readings) if isinstance(side, dict) and known else {}
+    for name in (name for name, error in found.items() if error > 0.0 and kinds[name].is_stick):
+        found[name] = max(found[name], least_error(own.numbers, kinds, name, own.spacing))
+    return found
 
 
 def differences(problem: Problem, changes: Mapping[str, KeyChange]) -> Differences:
@@ -275,7 +283,7 @@ def differences(problem: Problem, changes: Mapping[str, KeyChange]) -> Differenc
         ratio = (2 * side - 1) * changes[key].change / changes[key].value
         sides[key, side] = {name: ratio * x if known[name].is_stress else 0.0 for name, x in numbers.items()}
 
-    return Differences(numbers, list(in_space(last.readings)), sides)
+    return Differences(numbers, list(in_space(last.readings)), spacing(problem, last), sides)
 
 
 def _kept(problem: Problem, steps: Sequence[StepResult]) -> tuple[dict[str, float], StepResult]:
