@@ -138,7 +138,8 @@ def _draw(figure: Any, found: list[Judged]) -> None:
         some = [one for one in found if one.is_zone == zones and one.counts]
         for number in dict.fromkeys(one.number for one in some):
             here = [one for one in some if one.number == number]
-            axes.plot(*np.abs([(o.true, o.effect) for o in here]).T, "o", ms=3, alpha=0.5, label=words(number))
+            points = np.maximum(np.abs([(o.true, o.effect) for o in here]), LEAST / 100.0)
+            axes.plot(*points.T, "o", ms=3, alpha=0.5, label=words(number))
         axes.plot([LEAST, 1.0], [LEAST, 1.0], "k-", lw=0.8, label="equal")
         axes.set(xscale="log", yscale="log", xlabel="|effect| on half the edges, of the natural scale",
                  ylabel="|effect|, of the natural scale", title=title)  # fmt: skip
