@@ -141,9 +141,9 @@ def least_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: s
     scale, kind = scale_of(numbers, kinds, name), kinds[name]
     if kind is Kind.DISSIPATION and abs(numbers[name]) < scale:  # nothing slips
         scale *= _LEAST_SLIP
-    all_stick = numbers.get("stick_ratio_area", 0.0) >= 1.0 - _NOTHING
-    least = _LEAST_OF_STICK if all_stick and kind.is_stick else _LEAST_OF_ZONES if kind.is_zone else _LEAST
-    return least * spacing * scale
+    if kind.is_stick and numbers.get("stick_ratio_area", 0.0) >= 1.0 - _NOTHING:  # nothing slips
+        return _LEAST_OF_STICK * spacing * scale
+    return (_LEAST_OF_ZONES if kind.is_zone else _LEAST) * spacing * scale
 
 
 _ROUND_OFF = 1e-15

@@ -255,8 +255,9 @@ def _errors(own: Differences, others: Sequence[tuple[float, Differences]], at: t
     side, kinds = own.changed[at], kinds_of(own.readings)
     known = [(ratio, told) for ratio, other in others if isinstance(told := other.changed[at], dict)]
     found = spread_error(side, known, own.readings) if isinstance(side, dict) and known else {}
-    for name in (name for name, error in found.items() if error > 0.0 and kinds[name].is_stick):
-        found[name] = max(found[name], least_error(own.numbers, kinds, name, own.spacing))
+    for name, error in found.items():
+        if error > 0.0 and kinds[name].is_stick:
+            found[name] = max(error, least_error(own.numbers, kinds, name, own.spacing))
     return found
 
 

@@ -68,9 +68,9 @@ def export(
         raise Finger3dError("export: options of a mold need --mold")
     if what.mold + what.mesh + bool(what.solver) > 1:
         raise Finger3dError("export: --mold, --mesh and --solver write different things; give one of them")
-    loaded = load(scene, set_)
     from finger3d.io import check_folder
 
+    loaded = load(scene, set_)
     check_folder(out)
     done: Exported | ModelFiles
     with job(json_, lambda _: f"the files in {out} are complete") as report:
