@@ -342,7 +342,7 @@ def test_a_finger_drawn_outside_can_be_pressed(strange: Path, tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_a_finger_drawn_outside_presses_alike_from_step_and_stl(strange: Path, tmp_path: Path) -> None:
-    """Meshes of the body and of its facets agree within the sum of their error bars, 2 %."""
+    """Meshes of the body and of its facets agree within two error bars, as nine in ten do; those are narrow."""
     from finger3d.accuracy.estimate import estimate
     from finger3d.mechanics.history import measure
 
@@ -352,8 +352,8 @@ def test_a_finger_drawn_outside_presses_alike_from_step_and_stl(strange: Path, t
         problem, frames = pressed(strange / f"ridged.{kind}", scene, 'shape = "plane"', 0.25, (0.3, 1.2))
         force[kind] = measure(problem.points, frames[-1])["normal_force_N"]
         bars[kind] = estimate(problem, frames).discretisation["normal_force_N"]
-    assert abs(force["stl"] - force["step"]) <= sum(bars.values())
-    assert sum(bars.values()) < 0.06 * force["step"]
+    assert abs(force["stl"] - force["step"]) <= 2.0 * sum(bars.values())
+    assert 2.0 * sum(bars.values()) < 0.06 * force["step"]
 
 
 @pytest.mark.slow

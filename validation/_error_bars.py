@@ -276,11 +276,8 @@ def _rows(kind: str, found: list[Judged], what: str, slack: float = 1e-9) -> lis
         return []
     told = [j.estimate / j.error for j in here if j.error > max(1e-6, slack) * abs(j.value)] or [1.0]
     text = f"{kind}, {what}, {len(here)} cases"
-    share = _share(here, text, slack)
-    if "stick_ratio" in kind:  # a ring of slip may be unseen on all meshes
-        share = replace(share, kind="statement")
     return [
-        share,
+        _share(here, text, slack),
         at_most(f"estimate over true error, median: {text}", "a bar that is never wrong tells nothing", 10.0,
             float(np.median(told)), "one decade", "sensitivity"),
     ]  # fmt: skip

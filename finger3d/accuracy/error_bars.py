@@ -34,7 +34,7 @@ _LEAST = 0.001
 _LEAST_OF_ZONES = 0.02
 """The same for lengths and areas of contact and stick, which points on the border enter or leave unseen."""
 
-_LEAST_OF_STICK = 0.1
+_LEAST_OF_STICK = 0.15
 """The same for stick where all points stick: a ring of slip that is narrower than their distance is unseen."""
 
 _LEAST_SLIP = 0.1
