@@ -248,7 +248,7 @@ def test_a_ring_of_slip_narrower_than_the_distance_of_the_points_is_left_open_wh
     stuck = NUMBERS | {"stick_ratio_area": 1.0}
     found = spread_error(stuck, [(2.0, stuck)], spacing=0.1)
     assert (found["stick_area_mm2"], found["stick_ratio_area"]) == pytest.approx(
-        (0.1 * 0.1 * 0.5, 0.1 * 0.1), rel=1e-12
+        (0.15 * 0.1 * 0.5, 0.15 * 0.1), rel=1e-12
     )
     assert found["contact_half_length_mm"] == pytest.approx(2e-3, rel=1e-12)
 

@@ -5,16 +5,16 @@ The cells that the border crosses are bisected, once for every factor of two of 
 the press on the mesh before.
 
 A first mesh whose error is far below the tolerance is made coarser instead, as long as the tolerance is met.  Otherwise
-the edges of some zones of the mesh become shorter: those at the contact, at the base and the body around, at gauges,
-and at the border of stick.  Which of them is found on the companion with twice the edges, on which the edges of one
-zone at a time are made short again: the zones whose edges change the goal most are refined.
+the edges of one zone of the mesh become shorter: those at the contact, at the base and in the body, at gauges, or at
+the border of stick.  It is the zone that leaves the largest error in the goal, by presses in which the edges of one
+zone at a time are twice as long or, at the base, half as long.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
@@ -22,7 +22,7 @@ import numpy as np
 from finger3d._cost import GROWTH, PRESS_TO_ROUND
 from finger3d._ranges import four_digits
 from finger3d._types import Float, Tree
-from finger3d.accuracy.error_bars import relative_error
+from finger3d.accuracy.error_bars import gain, relative_error
 from finger3d.accuracy.estimate import discretisation, press_numbers
 from finger3d.contact.friction import SLIP, STICK
 from finger3d.errors import Finger3dError, UnresolvedError
@@ -94,12 +94,9 @@ def stick_borders(problem: Problem, steps: Sequence[StepResult]) -> Float:
     return np.unique(np.round(places[:, : problem.dim], 9), axis=0)
 
 
-MAX_ROUNDS = 8
+MAX_ROUNDS = 12
 GOAL, ALL = "normal_force_N", "all"
 """Number that a mesh is refined for unless a scene names another, and the name of all numbers together."""
-
-_MIN_SHARE = 0.3
-"""Least share of a zone in the largest change by any zone from which its edges become shorter."""
 
 _FACTOR_RANGE = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
 _COARSEN = 0.25
@@ -111,12 +108,11 @@ _WORTHWHILE = 0.7
 _FEWEST_POINTS = 8
 """Contact points that the half-length of contact keeps on a coarser mesh."""
 
-_MOST_GAUGE_REFINEMENT = 8.0
+_MOST_GAUGE_REFINEMENT = 16.0
 """Largest edge length at the contact over that around a gauge."""
 
 _FINER = 2.0
-"""Edges of the companion over those of one of its zones, when that is tried, and the least ratio at gauges and borders,
-where cells are bisected."""
+"""Ratio of the edges of a zone that are tried, and the least one at gauges and borders, where cells are bisected."""
 
 _FASTEST = 2.0
 """Order with which an error falls at most from round to round: a bar that is small by chance shall not end them."""
@@ -225,11 +221,12 @@ def refine_mesh(
         goal = "depth_mm"
     start, rounds, meshes = time.perf_counter(), list[Round](), list[MeshOptions]()
     options, problem = model.mesh, None
-    stopped = f"{MAX_ROUNDS} rounds"
+    stopped, grading = f"{MAX_ROUNDS} rounds", options.base_size_mm / options.size_mm
     while len(rounds) < MAX_ROUNDS:
         problem = None  # two factors at once would halve the mesh that memory allows
         try:
-            problem, done, wanted = _run_round(replace(model, mesh=options), tolerance, goal)
+            before = rounds[-1] if rounds else None
+            problem, done, wanted = _run_round(replace(model, mesh=options), tolerance, goal, before)
         except UnresolvedError as error:
             if rounds and rounds[-1].error <= tolerance:
                 break
@@ -242,9 +239,6 @@ def refine_mesh(
                 raise
             stopped = f"no finer mesh: {error or 'out of memory'}"
             break
-        if rounds and rounds[-1].number == done.number:
-            fall = min(new / old for new, old in zip(_edges(options), _edges(meshes[-1]), strict=True)) ** _FASTEST
-            done = replace(done, error=max(done.error, min(1.0, fall) * rounds[-1].error))
         rounds.append(done)
         meshes.append(options)
         report.say(done.line(len(rounds)))
@@ -256,6 +250,8 @@ def refine_mesh(
         )
         if coarsest or (done.error > tolerance and any(r.error <= tolerance for r in rounds)):
             break
+        if done.error > tolerance:  # edges that grow faster than those of the companions hide errors from them
+            wanted = replace(wanted, base_size_mm=min(wanted.base_size_mm, four_digits(grading * wanted.size_mm)))
         left = math.inf if max_seconds is None else max_seconds - (time.perf_counter() - start)
         found = _affordable(options, wanted, done.seconds, left, 3 if model.domain == "solid" else 2)
         if found is None:
@@ -267,69 +263,76 @@ def refine_mesh(
     return replace(refined, mesh=mesh, stopped="met" if refined.met else stopped, problem=last)
 
 
-def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
-    """Press on one mesh; return its problem, its round, and the edge lengths to try next."""
+def _run_round(model: Model, tolerance: float, goal: str, before: Round | None) -> tuple[Problem, Round, MeshOptions]:
+    """Press on the mesh after that of the round before; return its problem, round, and the edge lengths to try next."""
     start = time.perf_counter()
     problem = with_refined_borders(model)
     short = with_few_increments(problem)
     steps = list(march(short))
     steps[-1].check("the press on this mesh")
     numbers, kinds = press_numbers(short, steps[-1]), kinds_of(steps[-1].readings)
-    found, beside, _ = discretisation(short, steps, numbers=press_numbers)
+    found, *_ = discretisation(short, steps, numbers=press_numbers)
     names = [name for name in found.discretisation if name in numbers] if goal == ALL else [goal]
     errors = {name: relative_error(numbers, kinds, name, found.discretisation[name]) for name in names}
     worst, mesh = max(errors, key=lambda name: errors[name]), model.mesh
     error = errors[worst]
+    if before and before.number == worst:
+        fall = min(new / old for new, old in zip(_edges(mesh), _edges(before), strict=True)) ** _FASTEST
+        error = max(error, min(1.0, fall) * before.error)
     if error <= tolerance:
         wanted = _longer(problem, numbers["contact_half_length_mm"])
     else:
         factor = (_SAFETY * tolerance / error) ** (1.0 / (1.0 if kinds[worst].is_zone else kinds[worst].order))
         factor = min(max(factor, _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
-        wanted = _shorter(mesh, _zones_to_refine(beside, found.companion_numbers, worst, kinds[worst]), factor)
+        wanted = _shorter(mesh, _zone_to_refine(short.model, numbers[worst], worst, kinds[worst]), factor)
     edges = {key: getattr(mesh, key) for key in ("size_mm", "base_size_mm", "gauge_refinement", "stick_refinement")}
     dofs, seconds = int(problem.body.stiffness.upper.shape[0]), time.perf_counter() - start
     return problem, Round(**edges, dofs=dofs, error=error, number=worst, seconds=seconds), wanted
 
 
-def _edges(mesh: MeshOptions) -> tuple[float, ...]:
+def _edges(mesh: MeshOptions | Round) -> tuple[float, ...]:
     """Return the edge lengths (mm) of the zones of a mesh."""
     size = mesh.size_mm
     return size, mesh.base_size_mm, size / mesh.gauge_refinement, size / mesh.stick_refinement
 
 
-def _zones_to_refine(beside: Problem, known: Mapping[str, float], goal: str, kind: Kind) -> set[str]:
-    """Return the zones of a mesh whose edges change the goal most, from presses on its companion with one finer zone.
+def _zone_to_refine(model: Model, value: float, goal: str, kind: Kind) -> str:
+    """Return the zone of a mesh whose edges leave the largest error in the goal, which has a value on it.
 
-    Parameters
-    ----------
-    known : numbers of the companion
+    Edges at gauges and at the border of stick are tried beside longer ones at the contact, which alone keep theirs.
     """
-    mesh, zones = beside.model.mesh, {"contact"} if kind.is_zone else {"contact", "base"}
-    zones |= {"gauges"} if kind is Kind.STRAIN else set()
-    zones |= {"border"} if kind.is_stick else set()
-    changes = {}
-    for zone in sorted(zones):
-        finer = _shorter(mesh, {zone}, 1.0 / _FINER)
-        if finer == mesh:
-            continue
-        try:
-            problem = with_refined_borders(replace(beside.model, mesh=finer))
-            end = all_steps(problem, rough_workspace(problem), cuts=FEW_CUTS)[-1]
-        except (Finger3dError, MemoryError):
-            continue
-        changes[zone] = abs(press_numbers(problem, end)[goal] - known[goal])
-    largest = max(changes.values(), default=0.0)
-    return {zone for zone, change in changes.items() if change >= _MIN_SHARE * largest} or {"contact", "base"}
+    mesh, size = model.mesh, _FINER * model.mesh.size_mm
+    gauges, border = mesh.gauge_refinement, mesh.stick_refinement
+    coarse = _of_sizes(mesh, size, max(size, mesh.base_size_mm))
+    at_contact = replace(coarse, gauge_refinement=_FINER * gauges, stick_refinement=_FINER * border)
+    beside = _goal_on(model, at_contact, goal)
+    errors = {"contact": (beside - value) / gain(_FINER)}
+    if not kind.is_zone and mesh.base_size_mm > mesh.size_mm:
+        errors["base"] = (_goal_on(model, _shorter(mesh, "base", 1.0 / _FINER), goal) - value) / gain(1.0 / _FINER)
+    if kind is Kind.STRAIN and gauges < _MOST_GAUGE_REFINEMENT:
+        errors["gauges"] = (_goal_on(model, replace(at_contact, gauge_refinement=gauges), goal) - beside) / gain(_FINER)
+    if kind.is_stick and border < MOST_STICK_REFINEMENT:
+        errors["border"] = (_goal_on(model, replace(at_contact, stick_refinement=border), goal) - beside) / gain(_FINER)
+    return max(errors, key=lambda zone: math.inf if math.isnan(errors[zone]) else abs(errors[zone]))
 
 
-def _shorter(mesh: MeshOptions, zones: set[str], factor: float) -> MeshOptions:
-    """Return the edge lengths with those of some zones times a factor below 1; all others are kept."""
-    at_contact = factor if "contact" in zones else 1.0
+def _goal_on(model: Model, mesh: MeshOptions, goal: str) -> float:
+    """Return the goal in a rough press on another mesh, nan if it cannot be made or does not converge."""
+    try:
+        problem = with_refined_borders(replace(model, mesh=mesh))
+        return press_numbers(problem, all_steps(problem, rough_workspace(problem), cuts=FEW_CUTS)[-1])[goal]
+    except (Finger3dError, MemoryError):
+        return math.nan
+
+
+def _shorter(mesh: MeshOptions, zone: str, factor: float) -> MeshOptions:
+    """Return the edge lengths with those of one zone times a factor below 1; all others are kept."""
+    at_contact = factor if zone == "contact" else 1.0
     size = mesh.size_mm * at_contact
-    base = max(size, mesh.base_size_mm * (factor if "base" in zones else 1.0))
+    base = max(size, mesh.base_size_mm * (factor if zone == "base" else 1.0))
 
-    def finer(zone: str, ratio: float, most: float) -> float:  # edges there are given over those at the contact
-        there = min(factor, 1.0 / _FINER) if zone in zones else 1.0
+    def finer(where: str, ratio: float, most: float) -> float:  # edges there are given over those at the contact
+        there = min(factor, 1.0 / _FINER) if zone == where else 1.0
         return four_digits(min(max(1.0, ratio * at_contact / there), most))
 
     gauges = finer("gauges", mesh.gauge_refinement, _MOST_GAUGE_REFINEMENT)

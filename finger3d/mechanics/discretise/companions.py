@@ -49,7 +49,8 @@ _LEAST_IN_SECTION = 2000
 
 LEAST_IN_SOLID = 10_000
 """Unknowns of a solid below which it gets a finer companion besides: in coarser ones the errors at its base and at the
-contact may cancel.  Of swept fingers with 4 000 to 8 000 unknowns, half had forces off by 2 to 6 bars without it."""
+contact may cancel.  Of swept fingers with 4 000 to 8 000 unknowns, half had forces off by 2 to 6 bars without it.
+In those, cells that were bisected do not count."""
 
 _LEAST_UNSTRUCTURED_UNKNOWNS = 15_000
 """Unknowns below which an unstructured mesh is not coarsened: pytetwild needs nearly as many for any curved body."""
@@ -186,7 +187,9 @@ def coarse_companions(
             ratios.append(ratio)
             sizes.add(beside.mesh.points.size)
             yield ratio, beside
-    if problem.dim == 3 and (unknowns or problem.mesh.points.size) < LEAST_IN_SOLID and ratios:
+    is_swept = problem.dim == 3 and model.mesh.mesher == "swept"
+    unknowns = unknowns or (_unknowns(problem) if is_swept else problem.mesh.points.size)
+    if problem.dim == 3 and unknowns < LEAST_IN_SOLID and ratios:
         with suppress(Finger3dError):
             yield from finer_companions(problem, report, beside_coarser=True)
 
