@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 import runpy
 import shlex
@@ -143,7 +144,7 @@ def test_the_first_scene_gives_what_its_page_shows(root: Path, folder: Path, cap
 
 @pytest.mark.slow
 def test_the_numbers_of_the_readme_come_back(root: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
-    """Two meshes of fTetWild agree within the sum of their error bars."""
+    """Two meshes of fTetWild agree within two error bars of their difference."""
     assert main(["press", "geometries/fig9.toml", "--out", "out", "--no-figures"]) == 0
     line = r"^ *(normal force|stick area|strain of gauge g36) +([\d.]+) \+- ([\d.]+)"
     told, found = (
@@ -153,7 +154,7 @@ def test_the_numbers_of_the_readme_come_back(root: Path, folder: Path, capsys: p
     assert len(told) == 3
     for name, (value, bar) in told.items():
         other, its = found[name]
-        assert abs(value - other) <= bar + its, name
+        assert abs(value - other) <= 2.0 * math.hypot(bar, its), name
 
 
 def test_the_numbers_beside_other_codes_are_those_of_the_studies(root: Path) -> None:
