@@ -250,14 +250,18 @@ def _errors(own: Differences, others: Sequence[tuple[float, Differences]], at: t
     """Return the errors of the changes by a key, from those on other meshes.
 
     The border of stick moves past the contact points by fits: a change of its zone that is known has the least error of
-    the zone.
+    the zone.  A change whose sign another mesh does not confirm has an error as large as itself.
     """
     side, kinds = own.changed[at], kinds_of(own.readings)
     known = [(ratio, told) for ratio, other in others if isinstance(told := other.changed[at], dict)]
-    found = spread_error(side, known, own.readings) if isinstance(side, dict) and known else {}
+    if not isinstance(side, dict) or not known:
+        return {}
+    found = spread_error(side, known, own.readings)
     for name, error in found.items():
         if error > 0.0 and kinds[name].is_stick:
             found[name] = max(error, least_error(own.numbers, kinds, name, own.spacing))
+        if any(told[name] * side[name] <= 0.0 for _, told in known):
+            found[name] = max(found[name], abs(side[name]))
     return found
 
 
