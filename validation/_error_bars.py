@@ -7,9 +7,9 @@ the truth, by pytetwild too, has edges no less than half as long.  The share is 
 mesh: sections in plane stress and plane strain, swept solids, and solids by pytetwild; apart at large deformation.
 
 Each full run draws other sections and solids, with a seed that its rows state, and judges them apart; those at large
-deformation, too.  The factors of the bars were chosen on those drawn with the seeds 77130 and 699938006.  Increments are
-judged on drawn sections only, against 1280.  All bars are those of finger3d.accuracy.estimate.estimate, as a press has
-them; a number without a bar counts as outside of it.
+deformation, too.  The factors of the bars were chosen on those drawn with the seeds 77130 and 699938006.  Increments
+are judged on drawn sections only, against 1280.  All bars are those of finger3d.accuracy.estimate.estimate, as a press
+has them; a number without a bar counts as outside of it.
 """
 
 from __future__ import annotations
