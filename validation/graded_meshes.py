@@ -128,8 +128,6 @@ def _extrapolated(sizes: np.ndarray, values: np.ndarray) -> float:
 
 
 def _rows(found: list[Mesh]) -> Iterator[Row]:
-    within = [mesh.error <= 2.0 * mesh.told for mesh in found if mesh.way == "graded"]
-    yield judged("share-within-two-bars", float(np.mean(within)))
     for domain, goal in dict.fromkeys((mesh.domain, mesh.goal) for mesh in found):
         some = [mesh for mesh in found if (mesh.domain, mesh.goal) == (domain, goal)]
         equal = [mesh for mesh in some if mesh.way != "graded"]

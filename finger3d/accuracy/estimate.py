@@ -33,11 +33,10 @@ from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import SlipEvent, StepResult, measure, slip_margin, slips
 from finger3d.mechanics.march.step_halving import (
-    FEW_CUTS,
     StepEstimate,
     all_steps,
     errors_of_runs,
-    rough_workspace,
+    rough_steps,
     step_error,
     with_increments_of,
 )
@@ -103,7 +102,7 @@ def _pressed(beside: Problem, chosen: StepEstimate | None, cancel: Event | None)
         count, steps = chosen.runs[-1]
         if all(leg.steps == count for leg in beside.model.legs):
             return steps
-    return all_steps(beside, rough_workspace(beside), FEW_CUTS, cancel)
+    return rough_steps(beside, cancel)
 
 
 class CompanionThread:

@@ -34,7 +34,7 @@ from finger3d.errors import FAILURES, Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.step_halving import FEW_CUTS, all_steps, rough_workspace
+from finger3d.mechanics.march.step_halving import rough_steps
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings import of_kind
 
@@ -244,7 +244,7 @@ class Judgement:
             longer = _STILL if still and not self._on_its_mesh(factor) else 1.0
             model = self._coarse(effects, factor * longer, _STEPS[still])
             problem = replace(build(model), without_inclusions=None)
-            last = all_steps(problem, rough_workspace(problem), cuts=FEW_CUTS)[-1]
+            last = rough_steps(problem)[-1]
             strain = formulation_of(model).fields(problem, last.meshed_state)[1]
             numbers = changing_numbers(problem, last)
             scales = natural_scales(model, last.target.depth_mm, numbers)

@@ -31,7 +31,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.march.step_halving import FEW_CUTS, all_steps, rough_workspace, with_few_increments
+from finger3d.mechanics.march.step_halving import rough_steps, with_few_increments
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.readings import Kind, kinds_of
 from finger3d.meshing.sizing import SizedPlaces
@@ -320,7 +320,7 @@ def _goal_on(model: Model, mesh: MeshOptions, goal: str) -> float:
     """Return the goal in a rough press on another mesh, nan if it cannot be made or does not converge."""
     try:
         problem = with_refined_borders(replace(model, mesh=mesh))
-        return press_numbers(problem, all_steps(problem, rough_workspace(problem), cuts=FEW_CUTS)[-1])[goal]
+        return press_numbers(problem, rough_steps(problem)[-1])[goal]
     except (Finger3dError, MemoryError):
         return math.nan
 

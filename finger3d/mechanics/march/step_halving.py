@@ -421,6 +421,17 @@ def all_steps(
     return results
 
 
+def rough_steps(problem: Problem, cancel: Event | None = None) -> list[StepResult]:
+    """Solve all increments on a mesh that serves an estimate: at finite strain to the residual `ROUGH`.
+
+    Raises
+    ------
+    Finger3dError
+        If an increment does not converge.
+    """
+    return all_steps(problem, rough_workspace(problem), FEW_CUTS, cancel)
+
+
 def with_increments_of(legs: tuple[Leg, ...], count: int) -> tuple[Leg, ...]:
     """Return the legs with the automatic increments of a press that had `count` increments in all."""
     automatic_legs = sum(leg.steps == "auto" for leg in legs)
